@@ -1,0 +1,59 @@
+"""What a robot is asked to do: a forward speed and a yaw rate, and the loop that keeps a line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+PAPER_SPEED = 1.2
+"""Commanded forward speed v_d [m/s] (paper III-C)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What each of N robots is asked to do at one instant."""
+
+    forward_speed: Float[np.ndarray, " N"]
+    """Wanted base velocity along body x [m/s]."""
+    yaw_rate: Float[np.ndarray, " N"]
+    """Wanted base angular velocity about body z [rad/s]."""
+
+    @classmethod
+    def straight(cls, n: int, forward_speed: float = PAPER_SPEED) -> "Command":
+        """Straight ahead at one speed [m/s] for n robots: the paper's only command."""
+        return cls(forward_speed=np.full(n, float(forward_speed)), yaw_rate=np.zeros(n))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeadingLoop:
+    """A proportional loop from heading and lateral error to a yaw-rate command.
+
+    Ours: neither the reward nor the observation of the paper knows a heading, so without it robots
+    wander off their line.
+    """
+
+    heading_gain: float = 1.5
+    """Yaw rate per heading error [1/s]; ours: settles within 2 s at the yaw-rate limit."""
+    lateral_gain: float = 0.5
+    """Wanted heading per lateral error [rad/m]; ours."""
+    heading_limit: float = 0.6
+    """Largest heading towards the line [rad]; ours."""
+    yaw_rate_limit: float = 0.5
+    """Largest commanded yaw rate [rad/s]; ours: what the policies are trained for."""
+
+    def yaw_rate(
+        self,
+        yaw: Float[np.ndarray, " N"],
+        heading: Float[np.ndarray, " N"],
+        lateral_error: Float[np.ndarray, " N"] | float = 0.0,
+    ) -> Float[np.ndarray, " N"]:
+        """Yaw rate [rad/s] that turns a robot at `yaw` [rad] towards the line along `heading`.
+
+        `lateral_error` [m] is how far left of the line the robot stands.
+        """
+        towards = np.clip(
+            -self.lateral_gain * lateral_error, -self.heading_limit, self.heading_limit
+        )
+        error = heading + towards - yaw
+        wrapped = np.arctan2(np.sin(error), np.cos(error))
+        return np.clip(self.heading_gain * wrapped, -self.yaw_rate_limit, self.yaw_rate_limit)

@@ -1,0 +1,14 @@
+"""The product S × U as a `gymnasium.vector.VectorEnv`, and the ids by which Gymnasium knows it.
+
+After `import gaitshift.env`, `gymnasium.make_vec("gaitshift/trot-v0", num_envs=64)` and
+`gymnasium.make("gaitshift/trot-v0")` work for every shipped gait.
+"""
+
+from gaitshift.env.config import EnvConfig
+from gaitshift.env.gait_env import GaitEnv
+
+
+
+__all__ = ["EnvConfig", "GaitEnv", ]
+
+

@@ -1,0 +1,212 @@
+"""The environment: one control step, told as the paper tells it."""
+
+from dataclasses import replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from jaxtyping import Bool, Float, Float32, Int
+
+from gaitshift.command import Command
+from gaitshift.env.config import ACTION_LIMIT, EnvConfig
+from gaitshift.motion import Motion
+from gaitshift.observation import Observation, Situation
+from gaitshift.reward import walk_reward, with_bonus
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.robot import ANYMAL_B, Robot
+from gaitshift.terrain import Terrain
+from gaitshift.world import Pusher, World
+
+Observations = Float32[np.ndarray, "N D"]
+
+
+class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
+    """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
+
+    An episode ends when the body touches the ground, and is cut after `episode_steps` or at the
+    border of the terrain. Robots restart in the same step (`AutoresetMode.SAME_STEP`); the
+    observation that ended an episode is in `info["final_obs"]`, where `info["_final_obs"]` holds.
+    `info["reward_terms"]` has each weighted term of the reward, `info["changed"]` says where the
+    machine changed its state.
+    """
+
+    def __init__(
+        self,
+        machine: RewardMachine,
+        terrain: Terrain,
+        num_envs: int = 1,
+        *,
+        config: EnvConfig | None = None,
+        robot: Robot = ANYMAL_B,
+        threads: int = 0,
+    ) -> None:
+        self.config = EnvConfig() if config is None else config
+        self.machine = machine
+        self.robot = robot
+        self.num_envs = num_envs
+        self.observe = Observation(machine, self.config.observed)
+        self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
+        self.swing_scale = 1.0
+        """The share of the machine's swing heights that its guards ask for now, 0 to 1."""
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
+        self.single_observation_space = gym.spaces.Box(
+            -np.inf, np.inf, (self.observe.size,), np.float32
+        )
+        self.single_action_space = gym.spaces.Box(-ACTION_LIMIT, ACTION_LIMIT, (12,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._stance = robot.stance_angles
+        self._start(np.random.default_rng())
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts every episode anew. The same seed gives the same bits ever after."""
+        if seed is not None or not hasattr(self, "_rng"):
+            self._start(np.random.default_rng(seed))
+        self._restart(np.arange(self.num_envs))
+        return self._observation(), {}
+
+    def step(
+        self, actions: Float[np.ndarray, "N 12"]
+    ) -> tuple[
+        Observations,
+        Float[np.ndarray, " N"],
+        Bool[np.ndarray, " N"],
+        Bool[np.ndarray, " N"],
+        dict[str, Any],
+    ]:
+        """One control step of 10 ms; `actions` scale to joint targets about the stance."""
+        action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
+        self.world.push(self._pusher.step())
+        motion = self.world.step(self._stance + self.robot.action_scale * action)
+        self._state, changed, bonus = self.machine.step(
+            self._state,
+            motion.contact,
+            motion.clearance,
+            self._steps_in_state,
+            swing_scale=self.swing_scale,
+        )
+        self._steps_in_state = np.where(changed, 0, self._steps_in_state + 1)
+        shows_stance = self.machine.shows_state(self._state, motion.contact)
+        terms = walk_reward(
+            self.config.reward,
+            motion,
+            self._command,
+            stance=self._stance,
+            shows_stance=shows_stance,
+            action_change=action - self._last_action,
+        )
+        reward = with_bonus(self.config.reward, sum(terms.values()), bonus)
+        self._last_action = action
+        self._age += 1
+        info = {
+            "reward_terms": terms,
+            "changed": changed,
+            "shows_stance": shows_stance,
+            "forward_speed": motion.base_linear_velocity_b[:, 0],
+        }
+        terminated = motion.body_contact
+        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(motion)
+        truncated &= ~terminated
+        observation = self._next_observation(terminated | truncated, info)
+        return observation, reward, terminated, truncated, info
+
+    def set_terrain(self, terrain: Terrain) -> None:
+        """Exchanges the ground under the robots, which go on as they moved."""
+        self.world.set_terrain(terrain)
+
+    def push_at_most(self, force: float) -> None:
+        """Sets the largest push on a base [N] from now on; 0 ends the pushes."""
+        self.config = replace(self.config, push=replace(self.config.push, force=force))
+        self._pusher = Pusher(self.config.push, self.num_envs, self._rng)
+
+    def spread_ages(self) -> None:
+        """Draws the present age of every episode, so that not all are cut in the same step."""
+        self._age = self._rng.integers(0, self.config.episode_steps, self.num_envs)
+
+    def _start(self, rng: np.random.Generator) -> None:
+        n = self.num_envs
+        self._rng = rng
+        self._pusher = Pusher(self.config.push, n, rng)
+        self._state: Int[np.ndarray, " N"] = np.full(n, self.machine.initial)
+        self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
+        self._line: Float[np.ndarray, " N"] = np.zeros(n)
+        self._heading: Float[np.ndarray, " N"] = np.zeros(n)
+        self._command = Command.straight(n, self.config.forward_speed)
+
+    def _next_observation(
+        self, done: Bool[np.ndarray, " N"], info: dict[str, Any]
+    ) -> Observations:
+        self._update_command()
+        observation = self._observation()
+        ids = np.flatnonzero(done)
+        if ids.size == 0:
+            return observation
+        info["final_obs"], info["_final_obs"] = observation, done
+        self._restart(ids)
+        return self._observation()
+
+    def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
+        rng, config, count = self._rng, self.config, len(ids)
+        yaw = rng.uniform(-np.pi, np.pi, count)
+        velocity = np.zeros((count, 3))
+        velocity[:, :2] = rng.uniform(-config.velocity_noise, config.velocity_noise, (count, 2))
+        noise = rng.uniform(-config.joint_noise, config.joint_noise, (count, 12))
+        self.world.place(
+            ids,
+            xy=self._starting_points(count),
+            yaw=yaw,
+            joint_position=self._stance + noise,
+            base_velocity_w=velocity,
+        )
+        self._pusher.clear(ids)
+        self._state[ids] = self.machine.initial
+        self._steps_in_state[ids] = 0
+        self._age[ids] = 0
+        self._last_action[ids] = 0.0
+        self._line[ids] = self._heading[ids] = yaw
+        self._update_command()
+
+    def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
+        terrain = self.world.terrains[0]
+        if terrain.is_flat:
+            return np.zeros((count, 2))
+        x0, x1, y0, y1 = terrain.extent
+        inset = 2 * self.config.terrain_margin
+        low = (min(x0 + inset, (x0 + x1) / 2), min(y0 + inset, (y0 + y1) / 2))
+        high = (max(x1 - inset, (x0 + x1) / 2), max(y1 - inset, (y0 + y1) / 2))
+        return self._rng.uniform(low, high, (count, 2))
+
+    def _left_terrain(self, motion: Motion) -> Bool[np.ndarray, " N"]:
+        terrain = self.world.terrains[0]
+        if terrain.is_flat:
+            return np.zeros(self.num_envs, dtype=bool)
+        return ~terrain.contains(motion.base_position_w[:, :2], self.config.terrain_margin)
+
+    def _update_command(self) -> None:
+        config = self.config
+        if config.heading_range == 0:
+            return
+        due = np.flatnonzero(self._age % config.heading_interval == config.heading_interval - 1)
+        if due.size:
+            turn = self._rng.uniform(-config.heading_range, config.heading_range, due.size)
+            self._heading[due] = self._line[due] + turn
+        yaw_rate = config.heading_loop.yaw_rate(self.world.motion.yaw, self._heading)
+        self._command = Command(forward_speed=self._command.forward_speed, yaw_rate=yaw_rate)
+
+    def _observation(self) -> Observations:
+        return self.observe(
+            Situation(
+                machine_state=self._state,
+                steps_in_state=self._steps_in_state,
+                motion=self.world.motion,
+                command=self._command,
+                last_action=self._last_action,
+                stance=self._stance,
+            )
+        )

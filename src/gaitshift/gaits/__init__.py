@@ -1,0 +1,31 @@
+"""The gaits that come with the package: one TOML file each, beside this one.
+
+Gaits are data: a new file here is a new gait, and `load` takes any other file by its path.
+"""
+
+from pathlib import Path
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine import RewardMachine, read_toml
+from gaitshift.reward_machine.reading import known_names
+
+_FOLDER = Path(__file__).parent
+
+
+def names() -> tuple[str, ...]:
+    """Names of the shipped gaits, in alphabetical order."""
+    return tuple(sorted(file.stem for file in _FOLDER.glob("*.toml")))
+
+
+def load(name_or_path: str | Path) -> RewardMachine:
+    """The machine of a shipped gait by its name, or of a gait file by its path.
+
+    A `Path`, and a string that ends in .toml, is a path. Raises `GaitshiftError` where there is no
+    such gait, naming those there are, or where the file is faulty.
+    """
+    if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
+        return read_toml(Path(name_or_path))
+    if name_or_path not in names():
+        hint = "for a file of your own give its path, ending in .toml"
+        raise GaitshiftError(f"{known_names('gait', name_or_path, names())}; {hint}")
+    return read_toml(_FOLDER / f"{name_or_path}.toml")

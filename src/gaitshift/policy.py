@@ -1,0 +1,178 @@
+"""A policy file: one ONNX network with all that is needed to run it, and checks that it fits."""
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnxruntime
+from jaxtyping import Float, Float32
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.observation import Observation
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.robot import ROBOTS, Robot
+
+FORMAT_VERSION = 1
+"""Raised when a file of an earlier version could be misread."""
+
+_SHIPPED = Path(__file__).parent / "policies"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyInfo:
+    """What stands in a policy file beside the network."""
+
+    robot: str
+    """Name of the robot it was trained for."""
+    machine: dict[str, Any]
+    """The reward machine, whole (`RewardMachine.to_dict`)."""
+    observation: dict[str, list[int]]
+    """Start and end of each named slice of the observation."""
+    action_scale: float
+    """Joint target = stance + action_scale · action [rad]."""
+    stance: list[float]
+    """The robot's default joint angles [rad]."""
+    gains: str
+    """Preset of the robot's joint gains."""
+    kp: float
+    """[N·m/rad]"""
+    kd: float
+    """[N·m·s/rad]"""
+    control_rate: float
+    """Control steps a second [Hz]."""
+    forward_speed: float
+    """The forward speed it was trained for [m/s]."""
+    training: dict[str, Any]
+    """Command, seed, versions and figures of the training that made it."""
+    format_version: int = FORMAT_VERSION
+
+    def to_metadata(self) -> dict[str, str]:
+        """As ONNX keeps it: every value a JSON text."""
+        return {f"gaitshift.{key}": json.dumps(value) for key, value in vars(self).items()}
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A trained policy: observation in, action out, by onnxruntime without torch."""
+
+    path: Path
+    info: PolicyInfo
+    machine: RewardMachine
+    session: onnxruntime.InferenceSession
+
+    @property
+    def robot(self) -> Robot:
+        """The robot it drives."""
+        return ROBOTS[self.info.robot]
+
+    @property
+    def gait(self) -> str:
+        """Name of the gait."""
+        return self.machine.name
+
+    @cached_property
+    def observation(self) -> Observation:
+        """The observation it wants."""
+        return Observation(self.machine, tuple(self.info.observation))
+
+    def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
+        """The deterministic actions for N observations."""
+        return self.session.run(None, {"observation": observation})[0]
+
+    def target(self, action: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "N 12"]:
+        """Joint targets [rad] of an action."""
+        return np.asarray(self.info.stance) + self.info.action_scale * action
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the gaits whose policies come with the package."""
+    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.onnx")))
+
+
+def load(name_or_path: str | Path) -> Policy:
+    """A shipped policy by the name of its gait, or any policy file.
+
+    Raises:
+        GaitshiftError: no such policy; not a whole ONNX file; not one of gaitshift's; of another
+            format version or robot; or its parts contradict each other.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".onnx":
+        path = _SHIPPED / f"{name_or_path}.onnx"
+        if not path.is_file():
+            raise GaitshiftError(
+                f"no policy '{name_or_path}'; shipped: {', '.join(shipped())}; or give a .onnx file"
+            )
+    if not path.is_file():
+        raise GaitshiftError(f"no policy file {path}")
+    session = _open(path)
+    info = _read_info(path, session.get_modelmeta().custom_metadata_map)
+    policy = Policy(path, info, _machine(path, info), session)
+    _check(policy)
+    return policy
+
+
+def _open(path: Path) -> onnxruntime.InferenceSession:
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1  # the networks are small, the cores belong to the physics
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has a class for each fault, without a common base
+        raise GaitshiftError(
+            f"{path} is not a whole ONNX file (truncated or damaged); export it anew"
+        ) from error
+
+
+def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
+    version = metadata.get("gaitshift.format_version")
+    if version is None:
+        raise GaitshiftError(f"{path} is an ONNX file, but not a policy of gaitshift")
+    if version != str(FORMAT_VERSION):
+        raise GaitshiftError(
+            f"{path} has format version {version}; this gaitshift reads {FORMAT_VERSION}: "
+            "export it with this version"
+        )
+    fields = PolicyInfo.__dataclass_fields__
+    missing = [name for name in fields if f"gaitshift.{name}" not in metadata]
+    if missing:
+        raise GaitshiftError(f"{path} lacks the metadata '{missing[0]}'; export it anew")
+    try:
+        values = {name: json.loads(metadata[f"gaitshift.{name}"]) for name in fields}
+    except json.JSONDecodeError as error:
+        raise GaitshiftError(f"{path} has damaged metadata; export it anew") from error
+    return PolicyInfo(**values)
+
+
+def _machine(path: Path, info: PolicyInfo) -> RewardMachine:
+    try:
+        return RewardMachine.from_dict(info.machine)
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{path}: {error}") from error
+
+
+def _check(policy: Policy) -> None:
+    """Refuses a policy whose robot is unknown or whose parts contradict each other."""
+    path, info = policy.path, policy.info
+    if info.robot not in ROBOTS:
+        raise GaitshiftError(
+            f"{path} is for the robot '{info.robot}'; known here: {', '.join(ROBOTS)}"
+        )
+    robot = policy.robot
+    gains = robot.gains_of(info.gains)
+    if (gains.kp, gains.kd) != (info.kp, info.kd):
+        raise GaitshiftError(
+            f"{path} was trained with kp {info.kp}, kd {info.kd}, but the preset '{info.gains}' "
+            f"of {robot.name} is kp {gains.kp}, kd {gains.kd}"
+        )
+    if list(robot.stance) != info.stance:
+        raise GaitshiftError(f"{path} was trained from another stance of {robot.name}")
+    expected = {name: [s.start, s.stop] for name, s in policy.observation.slices.items()}
+    wanted = policy.session.get_inputs()[0].shape[1]
+    if expected != info.observation or wanted != policy.observation.size:
+        raise GaitshiftError(
+            f"{path}: its observation slices do not add up to its network's {wanted} inputs"
+        )

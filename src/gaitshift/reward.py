@@ -1,0 +1,117 @@
+"""The reward: Table I term by term, three small additions of ours, and the machine's bonus."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.command import Command
+from gaitshift.errors import GaitshiftError
+from gaitshift.motion import Motion
+
+BonusMode = Literal["add", "multiply_clipped", "multiply"]
+BONUS_MODES: tuple[BonusMode, ...] = ("add", "multiply_clipped", "multiply")
+
+RewardTerms = dict[str, Float[np.ndarray, " N"]]
+"""The weighted terms of R_walk by name, each (N,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardConfig:
+    """Weights of the reward. One reward for all gaits (paper III-C)."""
+
+    forward_velocity: float = 10.0
+    """Times exp(-(v_d - v_x)²) [s²/m²] (Table I)."""
+    lateral_velocity: float = -10.0
+    """Times v_y² + v_z² [s²/m²] (Table I)."""
+    roll_pitch_rate: float = -0.1
+    """Times ω_x² + ω_y² [s²] (Table I)."""
+    yaw_rate: float = -25.0
+    """Times (ω_z - commanded ω_z)² [s²] (Table I, where the command is always 0)."""
+    torque: float = -4e-5
+    """Times ‖τ‖² [1/(N·m)²] (Table I)."""
+    joint_position: float = -0.1
+    """Times ‖q - q_init‖² (Table I)."""
+    joint_velocity: float = -0.01
+    """Times ‖q̇‖² [s²] (Table I)."""
+    stance_pattern: float = 4.0
+    """Where the feet on the ground are exactly the stance of the present state; ours: the bonus
+    pays the instant of a change only, and feet chatter in between."""
+    slip: float = -0.5
+    """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
+    action_rate: float = -0.02
+    """Times ‖a - a_last‖²; ours: smooth targets."""
+    bonus: float = 200.0
+    """b, paid when the machine changes its state (paper III-C)."""
+    bonus_mode: BonusMode = "add"
+    """How b meets R_walk; ours is `add`, because `multiply` punishes a good change while R_walk is
+    negative (docs/paper.md)."""
+
+    def __post_init__(self) -> None:
+        if self.bonus_mode not in BONUS_MODES:
+            raise GaitshiftError(
+                f"unknown bonus mode '{self.bonus_mode}'; known: {', '.join(BONUS_MODES)}"
+            )
+
+    @classmethod
+    def paper(cls, bonus_mode: BonusMode = "add") -> "RewardConfig":
+        """Table I and b = 200 alone."""
+        return cls(stance_pattern=0.0, slip=0.0, action_rate=0.0, bonus_mode=bonus_mode)
+
+
+def walk_reward(
+    config: RewardConfig,
+    motion: Motion,
+    command: Command,
+    *,
+    stance: Float[np.ndarray, " 12"],
+    shows_stance: Bool[np.ndarray, " N"],
+    action_change: Float[np.ndarray, "N 12"],
+) -> RewardTerms:
+    """R_walk, term by term (Table I and the additions).
+
+    Args:
+        config: the weights.
+        motion: the motion after the step.
+        command: what was asked for.
+        stance: q_init [rad].
+        shows_stance: whether the feet in contact are the stance of the machine's state.
+        action_change: action minus the action before it.
+    """
+    velocity = motion.base_linear_velocity_b
+    rate = motion.base_angular_velocity_b
+    sideways = velocity[:, 1:]
+    foot_speed_squared = _squares(motion.foot_velocity_w[..., :2])
+    return {
+        "forward_velocity": config.forward_velocity
+        * np.exp(-np.square(command.forward_speed - velocity[:, 0])),
+        "lateral_velocity": config.lateral_velocity * _squares(sideways),
+        "roll_pitch_rate": config.roll_pitch_rate * _squares(rate[:, :2]),
+        "yaw_rate": config.yaw_rate * np.square(rate[:, 2] - command.yaw_rate),
+        "torque": config.torque * _squares(motion.joint_torque),
+        "joint_position": config.joint_position * _squares(motion.joint_position - stance),
+        "joint_velocity": config.joint_velocity * _squares(motion.joint_velocity),
+        "stance_pattern": config.stance_pattern * shows_stance,
+        "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
+        "action_rate": config.action_rate * _squares(action_change),
+    }
+
+
+def with_bonus(
+    config: RewardConfig, walk: Float[np.ndarray, " N"], bonus: Float[np.ndarray, " N"]
+) -> Float[np.ndarray, " N"]:
+    """The reward after δr: R_walk met by b times `bonus` where the machine changed its state.
+
+    `add` adds b, `multiply` multiplies R_walk by b, `multiply_clipped` multiplies max(R_walk, 0).
+    `bonus` is the edge's own factor, 0 where the machine stayed.
+    """
+    paid = config.bonus * bonus
+    if config.bonus_mode == "add":
+        return walk + paid
+    base = np.maximum(walk, 0.0) if config.bonus_mode == "multiply_clipped" else walk
+    return np.where(bonus > 0, base * paid, walk)
+
+
+def _squares(x: Float[np.ndarray, "*batch n"]) -> Float[np.ndarray, "*batch"]:
+    return np.einsum("...i,...i->...", x, x)

@@ -1,0 +1,88 @@
+"""A machine turned into arrays, so that N robots step by gathering and not by looping."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.legs import LABEL_COUNT, LEGS, contact_of
+from gaitshift.reward_machine.edge import Edge
+from gaitshift.reward_machine.feet import feet_label
+from gaitshift.reward_machine.state import State
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lookup:
+    """δu and δr by number: `edge` says which edge suits, the rows tell what it asks and gives.
+
+    The rows have one entry more than there are edges: the last, at index -1 and `edges`, stands
+    for "no guard holds".
+    """
+
+    edge: Int[np.ndarray, " states_x_16"]
+    """Edge that suits state u and label l, at index 16 u + l."""
+
+    exists: Bool[np.ndarray, " rows"]
+    """False in the last row only."""
+
+    target: Int[np.ndarray, " rows"]
+    """State the edge leads to."""
+
+    dwell: Int[np.ndarray, " rows"]
+    """Dwell of the edge [control steps]."""
+
+    dwell_share: Int[np.ndarray, " rows"]
+    """Dwell of the edge in parts of which the machine's own dwell has `dwell_parts`."""
+
+    dwell_parts: int
+    """See `dwell_share`."""
+
+    swing_height: Float[np.ndarray, " rows"]
+    """Least height of the up feet [m]."""
+
+    up: Bool[np.ndarray, "rows 4"]
+    """Feet whose height counts."""
+
+    bonus: Float[np.ndarray, " rows"]
+    """Multiplier of the shared bonus; 0 in the last row."""
+
+    stance: Int[np.ndarray, " states"]
+    """Contact label of each state's stance, -1 for an accepting state."""
+
+    is_stance: Bool[np.ndarray, " 16"]
+    """Whether a contact label is the stance of any state."""
+
+    fitting_state: Int[np.ndarray, " 16"]
+    """State whose stance agrees with a label on most feet, the lowest where several do."""
+
+    @classmethod
+    def of(cls, states: tuple[State, ...], edges: tuple[Edge, ...], *, dwell: int) -> Self:
+        """The arrays of a checked machine whose own dwell is `dwell` [control steps]."""
+        index = {state.name: u for u, state in enumerate(states)}
+        suits = np.full((len(states), LABEL_COUNT), len(edges))
+        for e, edge in enumerate(edges):
+            suits[index[edge.source], list(edge.guard.labels)] = e
+        dwells = np.array([edge.guard.dwell for edge in edges] + [0])
+        up = [[leg in edge.guard.up for leg in LEGS] for edge in edges]
+        stance = np.array([-1 if s.accepting else feet_label(s.stance) for s in states])
+        return cls(
+            edge=suits.ravel(),
+            exists=np.arange(len(edges) + 1) < len(edges),
+            target=np.array([index[edge.target] for edge in edges] + [0]),
+            dwell=dwells,
+            dwell_share=dwells if dwell else np.ones_like(dwells),
+            dwell_parts=dwell or 1,
+            swing_height=np.array([edge.guard.swing_height for edge in edges] + [0.0]),
+            up=np.array([*up, [False] * len(LEGS)]),
+            bonus=np.array([edge.bonus for edge in edges] + [0.0]),
+            stance=stance,
+            is_stance=np.isin(np.arange(LABEL_COUNT), stance),
+            fitting_state=_fitting_states(stance),
+        )
+
+
+def _fitting_states(stance: Int[np.ndarray, " states"]) -> Int[np.ndarray, " 16"]:
+    contact = contact_of(np.arange(LABEL_COUNT))
+    agreeing = (contact[:, None] == contact_of(stance)).sum(axis=-1)
+    return np.where(stance < 0, -1, agreeing).argmax(axis=1)

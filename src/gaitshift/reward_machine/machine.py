@@ -1,0 +1,221 @@
+"""The reward machine <U, u0, F, δu, δr> of a gait (paper III-B, III-C), for N robots at once."""
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Self
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.legs import LABEL_COUNT, LEGS, MIRRORED_LEGS, label_of
+from gaitshift.reward_machine.check import check
+from gaitshift.reward_machine.edge import Edge
+from gaitshift.reward_machine.guard import check_dwell
+from gaitshift.reward_machine.lookup import Lookup
+from gaitshift.reward_machine.mirror import mirrored_states
+from gaitshift.reward_machine.reading import Table, located
+from gaitshift.reward_machine.state import State
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_KEYS = (
+    "name",
+    "title",
+    "description",
+    "dwell",
+    "swing_height",
+    "ideal_phase",
+    "state",
+    "transition",
+)
+
+
+class Step(NamedTuple):
+    """What one step did to N machines."""
+
+    state: Int[np.ndarray, " N"]
+    """u', the state each machine is in now."""
+
+    changed: Bool[np.ndarray, " N"]
+    """Whether it came there by an edge in this step."""
+
+    bonus: Float[np.ndarray, " N"]
+    """Multiplier of the shared bonus: δr of the edge where changed, 0 elsewhere."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardMachine:
+    """A gait as a machine whose states are stance sets and whose edges are steps of the feet.
+
+    The laws in `check.py` hold for every instance; breaking one raises `GaitshiftError`. States
+    count from 0 in the order of `states` (U and F together), and the first is u0. Where no guard
+    holds the machine stays where it is.
+    """
+
+    name: str
+    """Short name in files and on the command line: letters, digits, "_" and "-"."""
+
+    title: str
+    """Name for people, such as "Half-bound"."""
+
+    description: str
+    """One or two sentences for people."""
+
+    states: tuple[State, ...]
+    """U and F."""
+
+    edges: tuple[Edge, ...]
+    """δu and δr."""
+
+    dwell: int
+    """The machine's own dwell [control steps], of every edge that names no other."""
+
+    ideal_phase: tuple[float, float, float, float]
+    """Touchdown of each foot in `LEGS` [fraction of the stride, 0 to below 1]: the gait's norm."""
+
+    def __post_init__(self):
+        if not _NAME.fullmatch(self.name):
+            raise GaitshiftError(
+                f"name {self.name!r} must be letters, digits, '_' and '-', a letter first"
+            )
+        check_dwell(self.dwell)
+        for leg, phase in zip(LEGS, self.ideal_phase, strict=True):
+            if not 0 <= phase < 1:
+                raise GaitshiftError(f"ideal_phase: {leg} must be 0 to below 1, not {phase:g}")
+        check(self.states, self.edges)
+
+    @property
+    def initial(self) -> int:
+        """u0."""
+        return 0
+
+    @property
+    def accepting(self) -> tuple[int, ...]:
+        """F: the states in which a run ends; empty for a gait that goes on for ever."""
+        return tuple(u for u, state in enumerate(self.states) if state.accepting)
+
+    def step(
+        self,
+        state: Int[np.ndarray, " N"],
+        contact: Bool[np.ndarray, "N 4"],
+        clearance: Float[np.ndarray, "N 4"],
+        steps_in_state: Int[np.ndarray, " N"],
+        *,
+        dwell: int | Int[np.ndarray, " N"] | None = None,
+        swing_scale: float = 1.0,
+    ) -> Step:
+        """δu and δr of N machines on the labels of this control step; nothing given is changed.
+
+        Args:
+            state: u, in which the policy acted.
+            contact: whether each foot touches at the end of the step, the label L(s, a, s').
+            clearance: height [m] of each foot's sole over the ground under it.
+            steps_in_state: δ that the policy saw, the steps since the last change: 0 in the step
+                that follows a change, and the step now ending counts. So an edge opens when
+                steps_in_state + 1 reaches its dwell, and two changes are at least a dwell apart.
+            dwell: a gait-frequency command [control steps], in place of the machine's own dwell;
+                an edge that names its own keeps its proportion to it, rounded up.
+            swing_scale: in [0, 1], factor on every swing height, so that training can raise the
+                feet by and by; at 0 no height is asked for.
+        """
+        if not 0 <= swing_scale <= 1:
+            raise ValueError(f"swing_scale must be in [0, 1], not {swing_scale}")
+        rows = self._lookup
+        edge = rows.edge[state * LABEL_COUNT + label_of(contact)]
+        waited = steps_in_state + 1
+        if dwell is None:
+            waited_enough = waited >= rows.dwell[edge]
+        else:
+            waited_enough = waited * rows.dwell_parts >= rows.dwell_share[edge] * dwell
+        height = rows.swing_height[edge] * swing_scale
+        low = rows.up[edge] & (height > 0)[:, None] & ~(clearance >= height[:, None])
+        changed = rows.exists[edge] & waited_enough & ~low.any(axis=1)
+        return Step(
+            state=np.where(changed, rows.target[edge], state),
+            changed=changed,
+            bonus=np.where(changed, rows.bonus[edge], 0.0),
+        )
+
+    def enter(self, contact: Bool[np.ndarray, "N 4"]) -> Int[np.ndarray, " N"]:
+        """The state to start in: the stance that agrees with the contacts on most feet.
+
+        Used at the start of an episode and after a switch of gaits, on which the paper is silent.
+        Ties go to the lowest state; an accepting state is never entered.
+        """
+        return self._lookup.fitting_state[label_of(contact)]
+
+    def shows_stance(self, contact: Bool[np.ndarray, "N 4"]) -> Bool[np.ndarray, " N"]:
+        """Whether the contacts are the stance of any state."""
+        return self._lookup.is_stance[label_of(contact)]
+
+    def shows_state(
+        self, state: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Whether the contacts are the stance of the present state."""
+        return label_of(contact) == self._lookup.stance[state]
+
+    def mirrored(self) -> "RewardMachine":
+        """The machine of the robot seen in a mirror; feet in the names of states change too."""
+        phase = self.ideal_phase
+        a, b, c, d = MIRRORED_LEGS
+        return RewardMachine(
+            name=self.name,
+            title=self.title,
+            description=self.description,
+            states=tuple(state.mirrored() for state in self.states),
+            edges=tuple(edge.mirrored() for edge in self.edges),
+            dwell=self.dwell,
+            ideal_phase=(phase[a], phase[b], phase[c], phase[d]),
+        )
+
+    def mirrored_states(self) -> tuple[int, ...] | None:
+        """State u seen in a mirror is state `result[u]` of this same machine.
+
+        None where the mirror shows another machine, as for a gait with a leading side.
+        """
+        return mirrored_states(self.states, self.edges)
+
+    def to_dict(self) -> dict[str, object]:
+        """The machine as plain data in the shape of a gait file, ready for JSON."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "description": self.description,
+            "dwell": self.dwell,
+            "ideal_phase": dict(zip(LEGS, self.ideal_phase, strict=True)),
+            "state": [state.to_dict() for state in self.states],
+            "transition": [edge.to_dict() for edge in self.edges],
+        }
+
+    @classmethod
+    def from_dict(cls, data: object) -> Self:
+        """The machine that `to_dict` or a gait file describes, checked in full.
+
+        Raises `GaitshiftError` with one line that names the table and the key.
+        """
+        table = Table(data, keys=_KEYS)
+        dwell = table.whole("dwell")
+        swing_height = table.number("swing_height", default=0.0)
+        with located("ideal_phase"):
+            phases = Table(table.get("ideal_phase"), keys=LEGS)
+            fl, fr, bl, br = (phases.number(leg) for leg in LEGS)
+        return cls(
+            name=table.text("name"),
+            title=table.text("title"),
+            description=table.text("description"),
+            states=tuple(
+                State.from_dict(one, number=number)
+                for number, one in enumerate(table.tables("state"), start=1)
+            ),
+            edges=tuple(
+                Edge.from_dict(one, number=number, dwell=dwell, swing_height=swing_height)
+                for number, one in enumerate(table.tables("transition"), start=1)
+            ),
+            dwell=dwell,
+            ideal_phase=(fl, fr, bl, br),
+        )
+
+    @cached_property
+    def _lookup(self) -> Lookup:
+        return Lookup.of(self.states, self.edges, dwell=self.dwell)

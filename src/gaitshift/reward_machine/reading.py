@@ -1,0 +1,104 @@
+"""Reads one table of a gait file key by key, and says in one line what is wrong and where."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
+from reprlib import repr as shortened
+from typing import cast
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine.feet import Feet
+
+
+@contextmanager
+def located(where: str) -> Iterator[None]:
+    """Put the place, such as "transition 2 (FL_BR -> FR_BL)", before any error raised inside."""
+    try:
+        yield
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{where}: {error}") from None
+
+
+def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
+    """The line for an unknown name: what it is, what may have been meant, what is known."""
+    close = get_close_matches(name, known, n=1)
+    meant = f" did you mean {close[0]!r}?" if close else ""
+    return f"unknown {kind} {name!r};{meant} {kind}s are {', '.join(known)}"
+
+
+class Table:
+    """One table of a gait file: its keys are all known, its values are asked for by type.
+
+    Every method raises a `GaitshiftError` naming the key where the value is missing or of
+    another type. A default makes the key optional.
+    """
+
+    def __init__(self, data: object, *, keys: tuple[str, ...]):
+        if not isinstance(data, dict):
+            raise GaitshiftError(f"must be a table of keys and values, not {shortened(data)}")
+        self._values = cast(dict[str, object], data)
+        for key in self._values:
+            if key not in keys:
+                raise GaitshiftError(known_names("key", str(key), keys))
+
+    def has(self, key: str) -> bool:
+        """Whether the key is given."""
+        return key in self._values
+
+    def get(self, key: str) -> object:
+        """The value as it stands."""
+        if key not in self._values:
+            raise GaitshiftError(f"key {key!r} is missing")
+        return self._values[key]
+
+    def text(self, key: str) -> str:
+        """A string that says something."""
+        value = self.get(key)
+        if not isinstance(value, str) or not value.strip():
+            raise _wrong(key, "a text", value)
+        return value
+
+    def flag(self, key: str, *, default: bool) -> bool:
+        """True or false."""
+        value = self._values.get(key, default)
+        if not isinstance(value, bool):
+            raise _wrong(key, "true or false", value)
+        return value
+
+    def whole(self, key: str, *, default: int | None = None) -> int:
+        """A whole number."""
+        value = self.get(key) if default is None else self._values.get(key, default)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise _wrong(key, "a whole number", value)
+        return value
+
+    def number(self, key: str, *, default: float | None = None) -> float:
+        """A number, whole or not."""
+        value = self.get(key) if default is None else self._values.get(key, default)
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            raise _wrong(key, "a number", value)
+        return float(value)
+
+    def feet(self, key: str) -> Feet:
+        """A list of feet, each named once."""
+        names = self._list(key, 'a list of feet, such as ["FL", "BR"]')
+        for name in names:
+            if not isinstance(name, str):
+                raise _wrong(key, 'a list of feet, such as ["FL", "BR"]', names)
+            if names.count(name) > 1:
+                raise GaitshiftError(f"{key!r} names {name} twice")
+        return frozenset(cast(list[str], names))
+
+    def tables(self, key: str) -> list[object]:
+        """A list of tables, [[key]] in TOML; each is still to be read."""
+        return self._list(key, f"a list of tables, [[{key}]]")
+
+    def _list(self, key: str, wanted: str) -> list[object]:
+        value = self.get(key)
+        if not isinstance(value, list):
+            raise _wrong(key, wanted, value)
+        return cast(list[object], value)
+
+
+def _wrong(key: str, wanted: str, value: object) -> GaitshiftError:
+    return GaitshiftError(f"{key!r} must be {wanted}, not {shortened(value)}")

@@ -1,0 +1,36 @@
+"""Reads a machine from a gait file: data, never evaluated as code."""
+
+import tomllib
+from pathlib import Path
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine.machine import RewardMachine
+from gaitshift.reward_machine.reading import located
+
+
+def read_toml(path: Path) -> RewardMachine:
+    """The machine in a TOML file, checked in full.
+
+    Raises `GaitshiftError` with one line that begins with the file's path, and names the line
+    where TOML itself is broken and the table where the machine is.
+    """
+    with located(str(path)):
+        return RewardMachine.from_dict(_tables_in(path))
+
+
+def _tables_in(path: Path) -> dict[str, object]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise GaitshiftError("there is no such file") from None
+    except OSError as error:
+        raise GaitshiftError(f"the file cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise GaitshiftError("this is not a TOML file: it is not UTF-8 text") from None
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise GaitshiftError(f"this is not a TOML file: {error}") from None
+    if not tables:
+        raise GaitshiftError("the file is empty")
+    return tables

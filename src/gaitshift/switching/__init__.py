@@ -1,0 +1,5 @@
+"""The conditions by which a robot shifts its gait itself: numpy alone, fit to run on the robot."""
+
+from gaitshift.switching.height_difference import HeightDifference as HeightDifference
+from gaitshift.switching.height_difference import HeightState as HeightState
+from gaitshift.switching.height_difference import height_in_frame as height_in_frame

@@ -1,0 +1,27 @@
+"""The ground in metres: height fields, makers of terrains and tracks, and their specs as text."""
+
+from gaitshift.terrain.height_field import Section, Terrain
+from gaitshift.terrain.pebbles import pebbles
+from gaitshift.terrain.perlin import perlin
+from gaitshift.terrain.shapes import flat, slope, stairs, step
+from gaitshift.terrain.spec import KINDS, Kind, from_spec, spec_help
+from gaitshift.terrain.track import track
+from gaitshift.terrain.unit_interval import UnitField, to_unit_interval
+
+__all__ = [
+    "KINDS",
+    "Kind",
+    "Section",
+    "Terrain",
+    "UnitField",
+    "flat",
+    "from_spec",
+    "pebbles",
+    "perlin",
+    "slope",
+    "spec_help",
+    "stairs",
+    "step",
+    "to_unit_interval",
+    "track",
+]

@@ -1,0 +1,140 @@
+"""The ground: heights on a regular grid, and the surface that MuJoCo spans over them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.errors import GaitshiftError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A stretch of ground along x made of one piece."""
+
+    name: str
+    """The spec of the piece, such as `perlin:0.1`."""
+    x0: float
+    """Where it begins, world frame [m]."""
+    x1: float
+    """Where it ends, world frame [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Terrain:
+    """Heights on a regular grid, in metres of the world frame, and the surface between them.
+
+    Rows run along +y and columns along +x, as in MuJoCo's height fields. The surface is MuJoCo's:
+    each cell is cut along the diagonal from sample [i, j] to sample [i+1, j+1], and each half is
+    flat. Heights are kept as a read-only float64 copy. `GaitshiftError` where a height or a
+    measure is not finite, where there are fewer than 2 × 2 samples, or where the size is not
+    positive.
+    """
+
+    height: Float[np.ndarray, "rows cols"]
+    """Height of each sample above the world's z = 0 [m]."""
+    size: tuple[float, float]
+    """Length along x and width along y, from first sample to last [m]."""
+    origin: tuple[float, float]
+    """World x and y of sample [0, 0], the corner of smallest x and y [m]."""
+    name: str
+    """The spec it was made of, for logs; arguments away from their defaults are not told."""
+    sections: tuple[Section, ...] = ()
+    """The pieces along x, in order and without gaps; left empty: one, the whole field."""
+
+    def __post_init__(self) -> None:
+        if self.height.ndim != 2 or min(self.height.shape) < 2:
+            shape = self.height.shape
+            raise GaitshiftError(f"terrain '{self.name}': needs 2 × 2 samples or more, got {shape}")
+        if not np.isfinite(self.height).all():
+            raise GaitshiftError(f"terrain '{self.name}': every height must be a finite number")
+        if not (np.isfinite([*self.size, *self.origin]).all() and min(self.size) > 0.0):
+            raise GaitshiftError(
+                f"terrain '{self.name}': size must be positive and origin finite [m], "
+                f"got size {self.size}, origin {self.origin}"
+            )
+        height = np.array(self.height, dtype=np.float64, order="C")
+        height.flags.writeable = False
+        object.__setattr__(self, "height", height)
+        if not self.sections:
+            x0, x1, _, _ = self.extent
+            object.__setattr__(self, "sections", (Section(name=self.name, x0=x0, x1=x1),))
+
+    @property
+    def cell(self) -> tuple[float, float]:
+        """Distance between neighbouring samples along x and along y [m]."""
+        rows, cols = self.height.shape
+        return self.size[0] / (cols - 1), self.size[1] / (rows - 1)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """The rectangle it covers in the world frame: x0, x1, y0, y1 [m]."""
+        (x0, y0), (length, width) = self.origin, self.size
+        return x0, x0 + length, y0, y0 + width
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether all heights are the same."""
+        return bool(self.height.min() == self.height.max())
+
+    def height_at(self, xy: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch"]:
+        """Height below points `xy` [m], world frame, of the surface that MuJoCo collides with.
+
+        Outside the field the height of the nearest point of the border is given, where MuJoCo has
+        no ground. A point that is not a number has no height: NaN.
+        """
+        near, middle, far, u, v = self._triangle(xy)
+        # From the corner along the grid as far as the larger of u, v, then along the other axis.
+        height = near + np.maximum(u, v) * (middle - near) + np.minimum(u, v) * (far - middle)
+        return np.asarray(height)
+
+    def normal_at(self, xy: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch 3"]:
+        """Upward unit normal of the surface below points `xy` [m], world frame; as `height_at`."""
+        near, middle, far, u, v = self._triangle(xy)
+        first, second = middle - near, far - middle
+        slope_x = np.where(u < v, second, first) / self.cell[0]
+        slope_y = np.where(u < v, first, second) / self.cell[1]
+        normal = np.stack([-slope_x, -slope_y, np.ones_like(slope_x)], axis=-1)
+        return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+    def contains(
+        self, xy: Float[np.ndarray, "*batch 2"], margin: float = 0.0
+    ) -> Bool[np.ndarray, "*batch"]:
+        """Whether points `xy` [m], world frame, lie on the field, `margin` [m] from its rim."""
+        x0, x1, y0, y1 = self.extent
+        x, y = xy[..., 0], xy[..., 1]
+        inside_x = (x >= x0 + margin) & (x <= x1 - margin)
+        return np.asarray(inside_x & (y >= y0 + margin) & (y <= y1 - margin))
+
+    def moved(self, dx: float, dy: float) -> "Terrain":
+        """Ground of the same shape, shifted by `dx`, `dy` [m]."""
+        return replace(
+            self,
+            origin=(self.origin[0] + dx, self.origin[1] + dy),
+            sections=tuple(replace(s, x0=s.x0 + dx, x1=s.x1 + dx) for s in self.sections),
+        )
+
+    def _triangle(
+        self, xy: Float[np.ndarray, "*batch 2"]
+    ) -> tuple[Float[np.ndarray, "*batch"], ...]:
+        """Triangle below each point: heights of its three corners, and u, v in [0, 1] in the cell.
+
+        The corners are [i, j], then [i, j+1] where u ≥ v or [i+1, j] where not, then [i+1, j+1].
+        """
+        samples, (rows, cols) = self.height.reshape(-1), self.height.shape
+        dx, dy = self.cell
+        u = np.minimum(np.maximum((xy[..., 0] - self.origin[0]) / dx, 0.0), cols - 1)
+        v = np.minimum(np.maximum((xy[..., 1] - self.origin[1]) / dy, 0.0), rows - 1)
+        # fmin, unlike minimum, gives points that are NaN some cell; their u, v stay NaN.
+        j = np.asarray(np.fmin(u, cols - 2)).astype(np.intp)
+        i = np.asarray(np.fmin(v, rows - 2)).astype(np.intp)
+        u, v = np.asarray(u - j), np.asarray(v - i)
+        corner = i * cols + j
+        middle = corner + np.where(u < v, cols, 1)
+        return (
+            samples.take(corner),
+            samples.take(middle),
+            samples.take(corner + cols + 1),
+            u,
+            v,
+        )

@@ -1,0 +1,78 @@
+"""A trained actor as a policy file."""
+
+from pathlib import Path
+from typing import Any
+
+import onnx
+import torch
+from onnx import TensorProto, helper, numpy_helper
+from rsl_rl.models import MLPModel
+
+from gaitshift.env import GaitEnv
+from gaitshift.policy import PolicyInfo
+from gaitshift.world.world import CONTROL_PERIOD
+
+OPSET = 18
+"""ONNX operator set; every onnxruntime of the last years reads it."""
+
+
+def describe(env: GaitEnv, training: dict[str, Any]) -> PolicyInfo:
+    """What a policy trained in `env` has to say of itself."""
+    gains = env.robot.gains_of(env.config.gains)
+    return PolicyInfo(
+        robot=env.robot.name,
+        machine=env.machine.to_dict(),
+        observation={name: [s.start, s.stop] for name, s in env.observe.slices.items()},
+        action_scale=env.robot.action_scale,
+        stance=list(env.robot.stance),
+        gains=env.config.gains,
+        kp=gains.kp,
+        kd=gains.kd,
+        control_rate=1.0 / CONTROL_PERIOD,
+        forward_speed=env.config.forward_speed,
+        training=training,
+    )
+
+
+def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
+    """Writes the actor's deterministic part and `info` as one ONNX file, whole or not at all.
+
+    The graph is written out layer by layer (normalisation, then linear and leaky ReLU in turn): the
+    network is no more than that, and the file then depends on no tracer's version.
+    """
+    nodes, constants = [], []
+    flow = "observation"
+
+    def constant(name: str, value: torch.Tensor) -> str:
+        constants.append(numpy_helper.from_array(value.detach().cpu().numpy().copy(), name))
+        return name
+
+    def node(kind: str, inputs: list[str], **attributes: Any) -> str:
+        output = f"{kind}_{len(nodes)}"
+        nodes.append(helper.make_node(kind, inputs, [output], **attributes))
+        return output
+
+    if actor.obs_normalization:
+        normalizer = actor.obs_normalizer
+        mean = constant("mean", normalizer._mean)
+        std = constant("std", normalizer._std + normalizer.eps)
+        flow = node("Div", [node("Sub", [flow, mean]), std])
+    for index, layer in enumerate(actor.mlp):
+        if isinstance(layer, torch.nn.Linear):
+            weight = constant(f"weight_{index}", layer.weight)
+            bias = constant(f"bias_{index}", layer.bias)
+            flow = node("Gemm", [flow, weight, bias], transB=1)
+        elif isinstance(layer, torch.nn.LeakyReLU):
+            flow = node("LeakyRelu", [flow], alpha=layer.negative_slope)
+        else:
+            raise TypeError(f"cannot export a layer of type {type(layer).__name__}")
+    nodes[-1].output[0] = "action"
+    observation = helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["N", actor.obs_dim])
+    action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["N", 12])
+    graph = helper.make_graph(nodes, "policy", [observation], [action], constants)
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=9)
+    helper.set_model_props(model, info.to_metadata())
+    onnx.checker.check_model(model)
+    part = path.with_suffix(".part")
+    onnx.save(model, str(part))
+    part.replace(path)

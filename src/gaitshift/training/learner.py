@@ -1,0 +1,155 @@
+"""rsl_rl's PPO on a `GaitEnv`: one object that collects and learns an iteration at a time."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from rsl_rl.algorithms import PPO
+from rsl_rl.models import MLPModel
+from rsl_rl.storage import RolloutStorage
+from tensordict import TensorDict
+
+from gaitshift.env import GaitEnv
+from gaitshift.observation import JOINT_MIRROR
+from gaitshift.training.recipe import PpoConfig, Recipe
+
+_GROUPS = {"actor": ["policy"], "critic": ["policy"]}
+"""Actor and critic see the same observation (paper IV-A)."""
+
+
+def as_tensors(observation: np.ndarray) -> TensorDict:
+    """An observation as rsl_rl wants it."""
+    return TensorDict({"policy": torch.from_numpy(observation)}, batch_size=[len(observation)])
+
+
+class Learner:
+    """Actor, critic and PPO for one environment."""
+
+    def __init__(self, env: GaitEnv, recipe: Recipe) -> None:
+        self.env = env
+        self.recipe = recipe
+        self._observation = as_tensors(env.reset()[0])
+        self.ppo = _build_ppo(env, recipe, self._observation)
+        self.totals: dict[str, float] = {}
+
+    def start_episodes(self, seed: int) -> None:
+        """Starts all robots anew from a seed, with the ages of their episodes spread out."""
+        observation, _ = self.env.reset(seed=seed)
+        self.env.spread_ages()
+        self._observation = as_tensors(observation)
+
+    def iterate(self) -> dict[str, float]:
+        """Collects one batch, learns from it, and tells what it saw."""
+        self.ppo.train_mode()
+        statistics = _Statistics()
+        with torch.inference_mode():
+            for _ in range(self.recipe.steps):
+                self._collect(statistics)
+            self.ppo.compute_returns(self._observation)
+        losses = self.ppo.update()
+        std = float(self.ppo.actor.distribution.std_param.detach().mean())
+        return {
+            **statistics.means(),
+            "value_loss": losses["value"],
+            "action_std": std,
+            "learning_rate": self.ppo.learning_rate,
+        }
+
+    def _collect(self, statistics: "_Statistics") -> None:
+        ppo, scale = self.ppo, self.recipe.ppo.reward_scale
+        action = ppo.act(self._observation)
+        observation, reward, terminated, truncated, info = self.env.step(action.numpy())
+        statistics.add(reward, terminated, truncated, info)
+        rewards = torch.from_numpy(scale * reward).float()
+        if truncated.any():
+            # A cut episode goes on in truth: its last step is worth what its true end was worth.
+            final = as_tensors(info["final_obs"][truncated])
+            rewards[torch.from_numpy(truncated)] += ppo.gamma * ppo.critic(final).squeeze(1)
+        self._observation = as_tensors(observation)
+        done = torch.from_numpy(terminated | truncated)
+        ppo.process_env_step(self._observation, rewards, done, {})
+
+
+class _Statistics:
+    """Means over an iteration of what the environment says each step."""
+
+    def __init__(self) -> None:
+        self._sums: dict[str, float] = {}
+        self._steps = 0
+
+    def add(
+        self,
+        reward: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+        info: dict[str, Any],
+    ) -> None:
+        """Takes in one step of all robots."""
+        seen = {
+            "reward": reward,
+            "speed": info["forward_speed"],
+            "falls": terminated,
+            "changes_per_s": 100.0 * info["changed"],
+            "stance_fraction": info["shows_stance"],
+            **{f"reward/{name}": term for name, term in info["reward_terms"].items()},
+        }
+        for name, value in seen.items():
+            self._sums[name] = self._sums.get(name, 0.0) + float(np.mean(value))
+        self._steps += 1
+
+    def means(self) -> dict[str, float]:
+        """Mean of each quantity; `survival` is the chance to last 10 s at the present rate of
+        falls."""
+        means = {name: total / self._steps for name, total in self._sums.items()}
+        means["survival"] = float((1.0 - means.pop("falls")) ** 1000)
+        return means
+
+
+def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
+    config = recipe.ppo
+    network: dict[str, Any] = {
+        "hidden_dims": config.hidden,
+        "activation": "lrelu",
+        "obs_normalization": config.normalize_observations,
+    }
+    distribution = {"class_name": "GaussianDistribution", "init_std": config.initial_std}
+    distribution["std_range"] = (0.05, 2.0)
+    actor = MLPModel(observation, _GROUPS, "actor", 12, **network, distribution_cfg=distribution)
+    critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
+    storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
+    symmetric = config.mirror and env.machine.mirrored_states() is not None
+    return PPO(
+        actor,
+        critic,
+        storage,
+        num_learning_epochs=config.epochs,
+        num_mini_batches=config.mini_batches,
+        clip_param=config.clip,
+        gamma=config.discount,
+        lam=config.gae_lambda,
+        entropy_coef=config.entropy,
+        learning_rate=config.learning_rate,
+        schedule="adaptive" if config.desired_kl > 0 else "fixed",
+        desired_kl=config.desired_kl,
+        symmetry_cfg=_symmetry(env) if symmetric else None,
+    )
+
+
+def _symmetry(env: GaitEnv) -> dict[str, Any]:
+    """rsl_rl's augmentation: each batch followed by its mirror image."""
+    order, signs = (torch.from_numpy(part) for part in env.observe.mirror)
+    joint_order = torch.tensor(JOINT_MIRROR[0])
+    joint_signs = torch.tensor(JOINT_MIRROR[1], dtype=torch.float32)
+
+    def augment(
+        env: Any, obs: TensorDict | None, actions: torch.Tensor | None
+    ) -> tuple[TensorDict | None, torch.Tensor | None]:
+        if obs is not None:
+            seen = obs["policy"]
+            both = torch.cat([seen, signs * seen[:, order]])
+            obs = TensorDict({"policy": both}, batch_size=[len(both)])
+        if actions is not None:
+            actions = torch.cat([actions, joint_signs * actions[:, joint_order]])
+        return obs, actions
+
+    return {"env": None, "data_augmentation_func": augment, "use_data_augmentation": True}

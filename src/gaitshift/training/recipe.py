@@ -1,0 +1,146 @@
+"""The recipe: everything that decides what a training run does, as data."""
+
+from dataclasses import dataclass, field, replace
+
+from gaitshift.env import EnvConfig
+from gaitshift.errors import GaitshiftError
+
+
+@dataclass(frozen=True, kw_only=True)
+class PpoConfig:
+    """Hyperparameters of PPO (Schulman et al. 2017), in rsl_rl's terms."""
+
+    hidden: tuple[int, ...] = (256, 128, 32)
+    """Hidden layers of actor and critic, each followed by a leaky ReLU (paper IV-A)."""
+    epochs: int = 5
+    """Passes over each batch; rsl_rl's default."""
+    mini_batches: int = 4
+    """Mini-batches a pass; rsl_rl's default."""
+    discount: float = 0.99
+    """γ; 1 s at 100 Hz."""
+    gae_lambda: float = 0.95
+    """λ of generalised advantage estimation."""
+    clip: float = 0.2
+    """Clipping of the probability ratio."""
+    learning_rate: float = 1e-3
+    """First learning rate; it follows `desired_kl` from there."""
+    desired_kl: float = 0.01
+    """KL divergence an update aims at."""
+    entropy: float = 0.003
+    """Weight of the entropy bonus; ours."""
+    initial_std: float = 0.8
+    """First standard deviation of the actions; ours."""
+    reward_scale: float = 0.02
+    """Rewards are scaled by this inside PPO alone; ours: values near 1 to 100 with b = 200."""
+    normalize_observations: bool = True
+    """Running mean and variance of the observations in front of both networks."""
+    mirror: bool = True
+    """Every batch is doubled by its mirror image (left and right changed), where the machine is
+    symmetric; ours, after Mittal et al. 2024."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """A stretch of training on one kind of ground."""
+
+    name: str
+    """Shown in the progress and written into `progress.csv`."""
+    iterations: int
+    """PPO iterations."""
+    amplitude: float = 0.0
+    """Largest |height| of the Perlin ground at the end of the stage [m]; 0 is flat ground."""
+    redraw_every: int = 5
+    """Iterations between two draws of the ground (paper III-D)."""
+    push: float = 0.0
+    """Largest push on the base [N]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """A training run: the same one for every gait."""
+
+    env: EnvConfig = field(default_factory=EnvConfig)
+    """The environment."""
+    ppo: PpoConfig = field(default_factory=PpoConfig)
+    """The algorithm."""
+    stages: tuple[Stage, ...] = (
+        Stage(name="flat", iterations=400),
+        Stage(name="rough", iterations=800, amplitude=0.15, push=120.0),
+    )
+    """Flat ground, then Perlin ground with pushes (paper III-D)."""
+    robots: int = 128
+    """Robots in parallel; ours: a core's worth of physics a step (the paper has 30)."""
+    steps: int = 24
+    """Control steps of each robot in an iteration; ours (the paper has 100)."""
+    swing_from: int = 60
+    """Iteration from which the guards' swing height grows from 0; ours: asked for from the start
+    it hides the cycle from exploration."""
+    swing_until: int = 210
+    """Iteration at which the guards ask for their whole swing height."""
+    checkpoint_every: int = 25
+    """Iterations between two checkpoints."""
+    threads: int = 2
+    """Threads of torch; the physics takes all cores."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (("robots", 1, 65536), ("steps", 1, 100_000)):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise GaitshiftError(f"{name} = {value}: {low} to {high} would be right")
+        if any(stage.iterations < 0 for stage in self.stages) or self.iterations < 1:
+            raise GaitshiftError("iterations: at least 1 would be right")
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of all stages together."""
+        return sum(stage.iterations for stage in self.stages)
+
+    def with_iterations(self, iterations: int) -> "Recipe":
+        """The same recipe cut, or its last stage drawn out, to this number of iterations."""
+        if iterations < 1:
+            raise GaitshiftError(f"{iterations} iterations: at least 1 would be right")
+        stages: list[Stage] = []
+        left = iterations
+        for stage in self.stages:
+            take = left if stage is self.stages[-1] else min(stage.iterations, left)
+            stages.append(replace(stage, iterations=take))
+            left -= take
+        return replace(self, stages=tuple(s for s in stages if s.iterations > 0))
+
+    def swing_scale(self, iteration: int) -> float:
+        """Share of the guards' swing height asked for at this iteration."""
+        if self.swing_until <= self.swing_from:
+            return 1.0
+        grown = (iteration - self.swing_from) / (self.swing_until - self.swing_from)
+        return min(max(grown, 0.0), 1.0)
+
+    @classmethod
+    def paper(cls) -> "Recipe":
+        """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
+
+        PPO has the defaults of stable-baselines3 where the paper names that library: 10 epochs,
+        mini-batches of 64, no observation normalisation, learning rate 3e-4 without adaptation.
+        """
+        return cls(
+            env=EnvConfig.paper(),
+            ppo=PpoConfig(
+                epochs=10,
+                mini_batches=47,
+                learning_rate=3e-4,
+                desired_kl=0.0,
+                entropy=0.0,
+                initial_std=1.0,
+                reward_scale=1.0,
+                normalize_observations=False,
+                mirror=False,
+            ),
+            stages=(Stage(name="flat", iterations=500),),
+            robots=30,
+            steps=100,
+            swing_from=0,
+            swing_until=0,
+        )
+
+
+PRESETS = {"default": Recipe, "paper": Recipe.paper}
+"""Recipes by the name that `gaitshift train --preset` takes."""

@@ -1,0 +1,236 @@
+"""A training run: its folder, its loop, and how it goes on after it was killed."""
+
+import csv
+import json
+import platform
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch.utils.tensorboard import SummaryWriter
+
+from gaitshift.env import GaitEnv
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.terrain import flat
+from gaitshift.training.config_file import recipe_from_dict
+from gaitshift.training.export import describe, export
+from gaitshift.training.ground import FIELD, draw_ground, stage_at
+from gaitshift.training.learner import Learner
+from gaitshift.training.recipe import Recipe
+
+CONFIG, PROGRESS, CHECKPOINTS, POLICY = "config.json", "progress.csv", "checkpoints", "policy.onnx"
+
+Row = dict[str, Any]
+"""A line of `progress.csv`."""
+
+
+class Run:
+    """One gait, one recipe, one seed, one folder.
+
+    A checkpoint is taken every `recipe.checkpoint_every` iterations. At each of them, in a run that
+    was never broken as in one that goes on from there, all robots start anew from a seed made of
+    the run's seed and the iteration: so both give the same weights, bit for bit.
+    """
+
+    def __init__(
+        self, folder: Path, machine: RewardMachine, recipe: Recipe, seed: int, command: str
+    ) -> None:
+        self.folder = folder
+        self.machine = machine
+        self.recipe = recipe
+        self.seed = seed
+        self.command = command
+        self.iteration = 0
+        self._wall = 0.0
+        torch.set_num_threads(recipe.threads)
+        torch.manual_seed(seed)
+        env = GaitEnv(machine, flat(FIELD, FIELD), recipe.robots, config=recipe.env)
+        self.learner = Learner(env, recipe)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path,
+        machine: RewardMachine,
+        recipe: Recipe,
+        *,
+        seed: int,
+        command: str,
+        overwrite: bool = False,
+    ) -> "Run":
+        """A new run in a new folder."""
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            if not overwrite:
+                raise GaitshiftError(
+                    f"{folder} exists and is not empty; give another --out, --overwrite, "
+                    f"or --resume {folder}"
+                )
+            _clear(folder)
+        run = cls(folder, machine, recipe, seed, command)
+        (folder / CHECKPOINTS).mkdir(parents=True, exist_ok=True)
+        config = {
+            "command": command,
+            "seed": seed,
+            "machine": machine.to_dict(),
+            "recipe": asdict(recipe),
+            "versions": _versions(),
+        }
+        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
+        run._save_checkpoint()
+        return run
+
+    @classmethod
+    def resume(cls, folder: Path) -> "Run":
+        """The run of a folder, as it was at its last checkpoint."""
+        try:
+            config = json.loads((folder / CONFIG).read_text())
+            machine = RewardMachine.from_dict(config["machine"])
+            recipe = recipe_from_dict(config["recipe"])
+            run = cls(folder, machine, recipe, config["seed"], config["command"])
+        except FileNotFoundError as error:
+            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
+        except (json.JSONDecodeError, KeyError) as error:
+            raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
+        checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
+        if not checkpoints:
+            raise GaitshiftError(f"{folder / CHECKPOINTS} holds no checkpoint to go on from")
+        run._load_checkpoint(checkpoints[-1])
+        return run
+
+    def train(self, report: Callable[[Row], None] = lambda row: None) -> Path:
+        """Runs to the end, calling `report` after each iteration; gives the policy's path.
+
+        Interrupted by Ctrl-C it leaves the last checkpoint, and the policy as it stands.
+        """
+        writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
+        self._trim_progress()
+        try:
+            while self.iteration < self.recipe.iterations:
+                row = self._iterate()
+                self._log(row, writer)
+                report(row)
+                if self._is_checkpoint():
+                    self._save_checkpoint()
+        finally:
+            writer.close()
+            self.export()
+        return self.folder / POLICY
+
+    def export(self) -> None:
+        """Writes the present policy into the folder."""
+        training = {
+            "command": self.command,
+            "seed": self.seed,
+            "iterations": self.iteration,
+            "steps": self._steps(),
+            "versions": _versions(),
+        }
+        export(self.learner.ppo.actor, describe(self.learner.env, training), self.folder / POLICY)
+
+    def _iterate(self) -> Row:
+        start = time.perf_counter()
+        stage, within = stage_at(self.recipe, self.iteration)
+        env = self.learner.env
+        if within % stage.redraw_every == 0 and (stage.amplitude > 0 or within == 0):
+            env.set_terrain(draw_ground(stage, within, self.seed))
+            env.push_at_most(stage.push)
+        if self._is_checkpoint():
+            self.learner.start_episodes(_seed_at(self.seed, self.iteration))
+        env.swing_scale = self.recipe.swing_scale(self.iteration)
+        seen = self.learner.iterate()
+        self.iteration += 1
+        self._wall += time.perf_counter() - start
+        return {
+            "iteration": self.iteration,
+            "stage": stage.name,
+            "steps": self._steps(),
+            "wall_s": round(self._wall, 3),
+            **{name: float(f"{value:.6g}") for name, value in seen.items()},
+        }
+
+    def _steps(self) -> int:
+        return self.iteration * self.recipe.robots * self.recipe.steps
+
+    def _is_checkpoint(self) -> bool:
+        last = self.iteration == self.recipe.iterations
+        return last or self.iteration % self.recipe.checkpoint_every == 0
+
+    def _save_checkpoint(self) -> None:
+        path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
+        part = path.with_suffix(".part")
+        state = {
+            "iteration": self.iteration,
+            "wall_s": self._wall,
+            "torch_rng": torch.get_rng_state(),
+            "ppo": self.learner.ppo.save(),
+        }
+        torch.save(state, part)
+        part.replace(path)
+
+    def _load_checkpoint(self, path: Path) -> None:
+        try:
+            state = torch.load(path, weights_only=True)
+        except Exception as error:  # torch has no common class for a damaged file
+            raise GaitshiftError(
+                f"{path} is damaged; remove it to go on from the one before"
+            ) from error
+        self.iteration = state["iteration"]
+        self._wall = state["wall_s"]
+        self.learner.ppo.load(state["ppo"], None, True)
+        torch.set_rng_state(state["torch_rng"])
+        stage, within = stage_at(self.recipe, self.iteration)
+        drawn = within - within % stage.redraw_every
+        self.learner.env.set_terrain(draw_ground(stage, drawn, self.seed))
+        self.learner.env.push_at_most(stage.push)
+
+    def _log(self, row: Row, writer: SummaryWriter) -> None:
+        path = self.folder / PROGRESS
+        new = not path.exists()
+        with path.open("a", newline="") as file:
+            lines = csv.DictWriter(file, row.keys())
+            if new:
+                lines.writeheader()
+            lines.writerow(row)
+        for name, value in row.items():
+            if name not in ("iteration", "stage"):
+                writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
+
+    def _trim_progress(self) -> None:
+        """Forgets the lines that a killed run wrote after its last checkpoint."""
+        path = self.folder / PROGRESS
+        if not path.exists():
+            return
+        with path.open(newline="") as file:
+            rows = [row for row in csv.DictReader(file) if int(row["iteration"]) <= self.iteration]
+        if not rows:
+            path.unlink()
+            return
+        part = path.with_suffix(".part")
+        with part.open("w", newline="") as file:
+            lines = csv.DictWriter(file, rows[0].keys())
+            lines.writeheader()
+            lines.writerows(rows)
+        part.replace(path)
+
+
+def _seed_at(seed: int, iteration: int) -> int:
+    return int(np.random.SeedSequence((seed, iteration)).generate_state(1)[0])
+
+
+def _versions() -> dict[str, str]:
+    packages = ("gaitshift", "mujoco-core", "numpy", "torch", "rsl-rl-lib", "gymnasium")
+    return {"python": platform.python_version(), **{name: version(name) for name in packages}}
+
+
+def _clear(folder: Path) -> None:
+    """Empties the folder of an earlier run; anything else in it is not ours to delete."""
+    if not (folder / CONFIG).is_file():
+        raise GaitshiftError(f"{folder} is not a training run, so it is not overwritten")
+    shutil.rmtree(folder)
