@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 PAPER_SPEED = 1.2
 """Commanded forward speed v_d [m/s] (paper III-C)."""
@@ -17,6 +17,10 @@ class Command:
     """Wanted base velocity along body x [m/s]."""
     yaw_rate: Float[np.ndarray, " N"]
     """Wanted base angular velocity about body z [rad/s]."""
+
+    def of(self, ids: Int[np.ndarray, " K"]) -> "Command":
+        """The command of some of the robots, in the order of `ids`."""
+        return Command(forward_speed=self.forward_speed[ids], yaw_rate=self.yaw_rate[ids])
 
     @classmethod
     def straight(cls, n: int, forward_speed: float = PAPER_SPEED) -> "Command":

@@ -4,11 +4,11 @@ Frames: `_w` world (z up), `_b` body (base origin, x forward, y left, z up). Axi
 axis 1 the leg (`gaitshift.legs.LEGS`) or the joint (legs × HAA, HFE, KFE).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +41,10 @@ class Motion:
     """Height of each foot's lowest point above the ground under it [m]."""
     body_contact: Bool[np.ndarray, " N"]
     """Whether the base touches the ground: the paper's end of an episode."""
+
+    def of(self, ids: Int[np.ndarray, " K"]) -> "Motion":
+        """The motion of some of the robots, in the order of `ids`."""
+        return Motion(**{f.name: getattr(self, f.name)[ids] for f in fields(self)})
 
     @cached_property
     def rotation_wb(self) -> Float[np.ndarray, "N 3 3"]:

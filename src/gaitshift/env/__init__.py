@@ -4,11 +4,9 @@ After `import gaitshift.env`, `gymnasium.make_vec("gaitshift/trot-v0", num_envs=
 `gymnasium.make("gaitshift/trot-v0")` work for every shipped gait.
 """
 
-from gaitshift.env.config import EnvConfig
-from gaitshift.env.gait_env import GaitEnv
+from gaitshift.env.config import EnvConfig as EnvConfig
+from gaitshift.env.gait_env import GaitEnv as GaitEnv
+from gaitshift.env.registry import register_gaits as register_gaits
+from gaitshift.env.single import SingleGaitEnv as SingleGaitEnv
 
-
-
-__all__ = ["EnvConfig", "GaitEnv", ]
-
-
+register_gaits()

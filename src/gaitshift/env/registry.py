@@ -3,10 +3,20 @@
 import gymnasium as gym
 
 from gaitshift import gaits
+from gaitshift.env.config import EnvConfig
+from gaitshift.env.gait_env import GaitEnv
+from gaitshift.env.single import SingleGaitEnv
+from gaitshift.terrain import from_spec
+
+_FIELD = 20.0
+"""Side of the ground of a registered environment [m]; ours: an episode of 10 s stays on it."""
 
 
 def register_gaits() -> None:
-    """Registers `gaitshift/<gait>-v0` for every shipped gait, on flat ground unless told otherwise."""
+    """Registers `gaitshift/<gait>-v0` for every shipped gait.
+
+    `gymnasium.make` and `make_vec` take the keywords of `make_vector` below.
+    """
     for name in gaits.names():
         gym.register(
             id=f"gaitshift/{name}-v0",
@@ -16,5 +26,26 @@ def register_gaits() -> None:
         )
 
 
-def make_vector(gait: str, num_envs: int = 1, **options: object):  # noqa: ANN201
-    return None
+def make_vector(
+    gait: str,
+    num_envs: int = 1,
+    *,
+    terrain: str = "flat",
+    terrain_seed: int = 0,
+    config: EnvConfig | None = None,
+) -> GaitEnv:
+    """The environment of a shipped gait, or of a machine file, on a terrain given by its spec."""
+    ground = from_spec(terrain, seed=terrain_seed, length=_FIELD, width=_FIELD)
+    return GaitEnv(gaits.load(gait), ground, num_envs, config=config)
+
+
+def make_single(
+    gait: str,
+    *,
+    terrain: str = "flat",
+    terrain_seed: int = 0,
+    config: EnvConfig | None = None,
+) -> SingleGaitEnv:
+    """`make_vector` for one robot, as a plain `gymnasium.Env`."""
+    ground = from_spec(terrain, seed=terrain_seed, length=_FIELD, width=_FIELD)
+    return SingleGaitEnv(gaits.load(gait), ground, config=config)

@@ -1,6 +1,16 @@
 """The gaits that come with the package: one TOML file each, beside this one.
 
-Gaits are data: a new file here is a new gait, and `load` takes any other file by its path.
+Gaits are data: a new file here is a new gait, and `load` takes any other file by its path. A file
+is checked when it is read, never run. It holds
+
+- `name`, `title`, `description`: short name, name for people, what the gait is;
+- `dwell` [control steps] and `swing_height` [m, 0 if left out]: what a transition asks for that
+  names no other;
+- `ideal_phase`: touchdown of each foot [fraction of the stride, 0 to below 1];
+- `[[state]]`, the first one initial: `name`, and `stance`, the feet down; or `name` and
+  `accepting = true` for a state in which the run ends;
+- `[[transition]]`: `from`, `to`, `down` (feet that must touch), `up` (feet that must not; the
+  others are free), and if wanted `dwell`, `swing_height` and `bonus` (factor on the shared bonus).
 """
 
 from pathlib import Path
@@ -18,7 +28,7 @@ def names() -> tuple[str, ...]:
 
 
 def load(name_or_path: str | Path) -> RewardMachine:
-    """The machine of a shipped gait by its name, or of a gait file by its path.
+    """Load the machine of a shipped gait by its name, or of a gait file by its path.
 
     A `Path`, and a string that ends in .toml, is a path. Raises `GaitshiftError` where there is no
     such gait, naming those there are, or where the file is faulty.

@@ -37,7 +37,7 @@ class Edge:
             raise GaitshiftError(f"bonus must be a finite number, not {self.bonus}")
 
     def mirrored(self) -> "Edge":
-        """The edge of the robot seen in a mirror."""
+        """Return the edge of the robot seen in a mirror."""
         return Edge(
             source=mirrored_name(self.source),
             target=mirrored_name(self.target),
@@ -46,7 +46,7 @@ class Edge:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """The table [[transition]] of a gait file, with nothing left to a default."""
+        """Return the table [[transition]] of a gait file, with nothing left to a default."""
         return {
             "from": self.source,
             "to": self.target,

@@ -16,30 +16,30 @@ def check_feet(feet: Feet) -> None:
 
 
 def in_leg_order(feet: Feet) -> list[str]:
-    """The feet in the order of `LEGS`."""
+    """Return the feet in the order of `LEGS`."""
     return [leg for leg in LEGS if leg in feet]
 
 
 def feet_text(feet: Feet) -> str:
-    """The feet as a person reads them: "FL BR", or "no foot"."""
+    """Name the feet as a person reads them: "FL BR", or "no foot"."""
     return " ".join(in_leg_order(feet)) or "no foot"
 
 
 def feet_label(feet: Feet) -> int:
-    """The contact pattern in which these feet alone touch, as `legs.label_of` counts it."""
+    """Return the number, as `legs.label_of` has it, of the pattern of these feet alone."""
     return sum(1 << LEGS.index(foot) for foot in feet)
 
 
 def feet_of_label(label: int) -> Feet:
-    """The feet that touch in this contact pattern."""
+    """Return the feet that touch in this contact pattern."""
     return frozenset(leg for i, leg in enumerate(LEGS) if label >> i & 1)
 
 
 def mirrored_feet(feet: Feet) -> Feet:
-    """The same feet seen in a mirror: left and right change places."""
+    """Return the same feet seen in a mirror: left and right change places."""
     return frozenset(_IN_MIRROR[foot] for foot in feet)
 
 
 def mirrored_name(name: str) -> str:
-    """A state's name seen in a mirror: FL_BR becomes FR_BL, and a name without feet stays."""
+    """Mirror a state's name: FL_BR becomes FR_BL, and a name without feet stays."""
     return "_".join(_IN_MIRROR.get(part, part) for part in name.split("_"))

@@ -45,10 +45,7 @@ class Guard:
         if both := self.down & self.up:
             raise GaitshiftError(f"{feet_text(both)} cannot be both down and up")
         check_dwell(self.dwell)
-        if not 0 <= self.swing_height <= MOST_SWING_HEIGHT:
-            raise GaitshiftError(
-                f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, not {self.swing_height:g}"
-            )
+        check_swing_height(self.swing_height)
 
     def holds_in(self, feet: Feet) -> bool:
         """Whether the contacts suit the guard when these feet alone touch."""
@@ -66,7 +63,7 @@ class Guard:
         return feet_of_label(min(shared)) if shared else None
 
     def mirrored(self) -> "Guard":
-        """The guard of the robot seen in a mirror."""
+        """Return the guard of the robot seen in a mirror."""
         return Guard(
             down=mirrored_feet(self.down),
             up=mirrored_feet(self.up),
@@ -75,7 +72,7 @@ class Guard:
         )
 
     def demands(self) -> list[str]:
-        """What the guard asks for, one demand a line, for people."""
+        """List what the guard asks for, for people."""
         height = f" by {100 * self.swing_height:g} cm" if self.swing_height and self.up else ""
         lines = [f"{feet_text(self.down)} down"] if self.down else []
         lines += [f"{feet_text(self.up)} up{height}"] if self.up else []
@@ -86,3 +83,9 @@ def check_dwell(dwell: int) -> None:
     """Refuse a negative or absurd dwell, with a `GaitshiftError`."""
     if not 0 <= dwell <= MOST_DWELL:
         raise GaitshiftError(f"dwell must be 0 to {MOST_DWELL} control steps, not {dwell}")
+
+
+def check_swing_height(height: float) -> None:
+    """Refuse a negative or absurd swing height [m], with a `GaitshiftError`."""
+    if not 0 <= height <= MOST_SWING_HEIGHT:
+        raise GaitshiftError(f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, not {height:g}")

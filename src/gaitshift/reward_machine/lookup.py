@@ -58,7 +58,7 @@ class Lookup:
 
     @classmethod
     def of(cls, states: tuple[State, ...], edges: tuple[Edge, ...], *, dwell: int) -> Self:
-        """The arrays of a checked machine whose own dwell is `dwell` [control steps]."""
+        """Build the arrays of a checked machine whose own dwell is `dwell` [control steps]."""
         index = {state.name: u for u, state in enumerate(states)}
         suits = np.full((len(states), LABEL_COUNT), len(edges))
         for e, edge in enumerate(edges):
@@ -85,4 +85,4 @@ class Lookup:
 def _fitting_states(stance: Int[np.ndarray, " states"]) -> Int[np.ndarray, " 16"]:
     contact = contact_of(np.arange(LABEL_COUNT))
     agreeing = (contact[:, None] == contact_of(stance)).sum(axis=-1)
-    return np.where(stance < 0, -1, agreeing).argmax(axis=1)
+    return agreeing.argmax(axis=1)

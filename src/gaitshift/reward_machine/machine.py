@@ -12,7 +12,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.legs import LABEL_COUNT, LEGS, MIRRORED_LEGS, label_of
 from gaitshift.reward_machine.check import check
 from gaitshift.reward_machine.edge import Edge
-from gaitshift.reward_machine.guard import check_dwell
+from gaitshift.reward_machine.guard import check_dwell, check_swing_height
 from gaitshift.reward_machine.lookup import Lookup
 from gaitshift.reward_machine.mirror import mirrored_states
 from gaitshift.reward_machine.reading import Table, located
@@ -138,7 +138,7 @@ class RewardMachine:
         )
 
     def enter(self, contact: Bool[np.ndarray, "N 4"]) -> Int[np.ndarray, " N"]:
-        """The state to start in: the stance that agrees with the contacts on most feet.
+        """Return the state to start in: the stance that agrees with the contacts on most feet.
 
         Used at the start of an episode and after a switch of gaits, on which the paper is silent.
         Ties go to the lowest state; an accepting state is never entered.
@@ -156,7 +156,7 @@ class RewardMachine:
         return label_of(contact) == self._lookup.stance[state]
 
     def mirrored(self) -> "RewardMachine":
-        """The machine of the robot seen in a mirror; feet in the names of states change too."""
+        """Return the machine of the robot seen in a mirror; feet in names of states change too."""
         phase = self.ideal_phase
         a, b, c, d = MIRRORED_LEGS
         return RewardMachine(
@@ -177,7 +177,7 @@ class RewardMachine:
         return mirrored_states(self.states, self.edges)
 
     def to_dict(self) -> dict[str, object]:
-        """The machine as plain data in the shape of a gait file, ready for JSON."""
+        """Return the machine as plain data in the shape of a gait file, ready for JSON."""
         return {
             "name": self.name,
             "title": self.title,
@@ -190,13 +190,15 @@ class RewardMachine:
 
     @classmethod
     def from_dict(cls, data: object) -> Self:
-        """The machine that `to_dict` or a gait file describes, checked in full.
+        """Build the machine that `to_dict` or a gait file describes, checked in full.
 
         Raises `GaitshiftError` with one line that names the table and the key.
         """
         table = Table(data, keys=_KEYS)
         dwell = table.whole("dwell")
+        check_dwell(dwell)
         swing_height = table.number("swing_height", default=0.0)
+        check_swing_height(swing_height)
         with located("ideal_phase"):
             phases = Table(table.get("ideal_phase"), keys=LEGS)
             fl, fr, bl, br = (phases.number(leg) for leg in LEGS)

@@ -4,7 +4,7 @@ from gaitshift.reward_machine.machine import RewardMachine
 
 
 def mermaid(machine: RewardMachine) -> str:
-    """The machine as a Mermaid `stateDiagram-v2`: one line a state, one line an edge."""
+    """Write the machine as a Mermaid `stateDiagram-v2`: a line a state, a line an edge."""
     lines = ["stateDiagram-v2", "    direction LR"]
     lines += [f"    {s.name} : {s.name}, {s.stance_text()}" for s in machine.states]
     lines += [f"    [*] --> {machine.states[machine.initial].name}"]

@@ -1,6 +1,6 @@
 """Reads one table of a gait file key by key, and says in one line what is wrong and where."""
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from reprlib import repr as shortened
@@ -11,7 +11,7 @@ from gaitshift.reward_machine.feet import Feet
 
 
 @contextmanager
-def located(where: str) -> Iterator[None]:
+def located(where: str) -> Generator[None]:
     """Put the place, such as "transition 2 (FL_BR -> FR_BL)", before any error raised inside."""
     try:
         yield
@@ -20,7 +20,7 @@ def located(where: str) -> Iterator[None]:
 
 
 def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
-    """The line for an unknown name: what it is, what may have been meant, what is known."""
+    """Say in one line what is unknown, what may have been meant and what is known."""
     close = get_close_matches(name, known, n=1)
     meant = f" did you mean {close[0]!r}?" if close else ""
     return f"unknown {kind} {name!r};{meant} {kind}s are {', '.join(known)}"
@@ -46,41 +46,44 @@ class Table:
         return key in self._values
 
     def get(self, key: str) -> object:
-        """The value as it stands."""
+        """Return the value as it stands."""
         if key not in self._values:
             raise GaitshiftError(f"key {key!r} is missing")
         return self._values[key]
 
     def text(self, key: str) -> str:
-        """A string that says something."""
+        """Return a string that says something."""
         value = self.get(key)
         if not isinstance(value, str) or not value.strip():
             raise _wrong(key, "a text", value)
         return value
 
     def flag(self, key: str, *, default: bool) -> bool:
-        """True or false."""
+        """Return true or false."""
         value = self._values.get(key, default)
         if not isinstance(value, bool):
             raise _wrong(key, "true or false", value)
         return value
 
     def whole(self, key: str, *, default: int | None = None) -> int:
-        """A whole number."""
+        """Return a whole number."""
         value = self.get(key) if default is None else self._values.get(key, default)
         if not isinstance(value, int) or isinstance(value, bool):
             raise _wrong(key, "a whole number", value)
         return value
 
     def number(self, key: str, *, default: float | None = None) -> float:
-        """A number, whole or not."""
+        """Return a number, whole or not."""
         value = self.get(key) if default is None else self._values.get(key, default)
         if not isinstance(value, int | float) or isinstance(value, bool):
             raise _wrong(key, "a number", value)
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise _wrong(key, "a number of a usual size", value) from None
 
     def feet(self, key: str) -> Feet:
-        """A list of feet, each named once."""
+        """Return a list of feet, each named once."""
         names = self._list(key, 'a list of feet, such as ["FL", "BR"]')
         for name in names:
             if not isinstance(name, str):
@@ -90,7 +93,7 @@ class Table:
         return frozenset(cast(list[str], names))
 
     def tables(self, key: str) -> list[object]:
-        """A list of tables, [[key]] in TOML; each is still to be read."""
+        """Return a list of tables, [[key]] in TOML, each still to be read."""
         return self._list(key, f"a list of tables, [[{key}]]")
 
     def _list(self, key: str, wanted: str) -> list[object]:

@@ -41,7 +41,7 @@ class State:
             raise GaitshiftError("an accepting state stands for no stance; leave 'stance' out")
 
     def mirrored(self) -> "State":
-        """The state of the robot seen in a mirror; feet in its name change too."""
+        """Return the state of the robot seen in a mirror; feet in its name change too."""
         return State(
             name=mirrored_name(self.name),
             stance=mirrored_feet(self.stance),
@@ -49,11 +49,11 @@ class State:
         )
 
     def stance_text(self) -> str:
-        """What the state stands for, for people."""
+        """Say what the state stands for, for people."""
         return "the run ends" if self.accepting else f"{feet_text(self.stance)} down"
 
     def to_dict(self) -> dict[str, object]:
-        """The table [[state]] of a gait file."""
+        """Return the table [[state]] of a gait file."""
         table: dict[str, object] = {"name": self.name}
         return table | (
             {"accepting": True} if self.accepting else {"stance": in_leg_order(self.stance)}

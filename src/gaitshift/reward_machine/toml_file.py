@@ -9,7 +9,7 @@ from gaitshift.reward_machine.reading import located
 
 
 def read_toml(path: Path) -> RewardMachine:
-    """The machine in a TOML file, checked in full.
+    """Read the machine in a TOML file, checked in full.
 
     Raises `GaitshiftError` with one line that begins with the file's path, and names the line
     where TOML itself is broken and the table where the machine is.
@@ -29,7 +29,7 @@ def _tables_in(path: Path) -> dict[str, object]:
         raise GaitshiftError("this is not a TOML file: it is not UTF-8 text") from None
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
         raise GaitshiftError(f"this is not a TOML file: {error}") from None
     if not tables:
         raise GaitshiftError("the file is empty")

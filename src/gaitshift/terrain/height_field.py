@@ -131,10 +131,5 @@ class Terrain:
         u, v = np.asarray(u - j), np.asarray(v - i)
         corner = i * cols + j
         middle = corner + np.where(u < v, cols, 1)
-        return (
-            samples.take(corner),
-            samples.take(middle),
-            samples.take(corner + cols + 1),
-            u,
-            v,
-        )
+        near, far = samples.take(corner), samples.take(corner + cols + 1)
+        return np.asarray(near), np.asarray(samples.take(middle)), np.asarray(far), u, v

@@ -13,7 +13,7 @@ AMPLITUDE = Quantity(name="amplitude", unit="m", low=0.0, high=1.0)
 """Of the largest |height|. Ours: twice ANYmal's standing height is no ground to walk on."""
 
 _WAVELENGTH = Quantity(name="wavelength", unit="m", low=0.1, high=100.0)
-_OCTAVES = Quantity(name="octaves", unit="", low=1, high=8)
+_OCTAVES = Quantity(name="octaves", unit="", low=1.0, high=8.0)
 _LACUNARITY = Quantity(name="lacunarity", unit="", low=1.0, high=4.0)
 _GAIN = Quantity(name="gain", unit="", low=0.0, high=1.0)
 
@@ -35,16 +35,16 @@ def perlin(
 
     The sum of `octaves` layers of Perlin noise: layer o has lattice spacing
     `wavelength` / `lacunarity`^o [m] and weight `gain`^o. The lattices start at sample [0, 0] and
-    do not depend on `cell`, so that a finer cell samples the same ground. Octaves, lacunarity
-    and gain are those of the paper's sibling code (facts 2.8); its lattice spacing is not known to
-    us, and 1.5 m, about two body lengths, is ours.
+    do not depend on `cell`, so that a finer cell samples the same ground. Octaves, lacunarity and
+    gain are those of the first author's code for another robot (Quadruped_MPC_vs_RL); the paper
+    tells none, and the wavelength, about two body lengths, is ours.
 
     `GaitshiftError` where a number is out of range or `cell` is longer than half of the shortest
     lattice spacing. Source: Perlin, "Improving Noise", SIGGRAPH 2002, with random unit gradients.
     """
     AMPLITUDE.check(amplitude)
     _WAVELENGTH.check(wavelength)
-    _OCTAVES.check(octaves)
+    _OCTAVES.check(float(octaves))
     _LACUNARITY.check(lacunarity)
     _GAIN.check(gain)
     grid = Grid(length=length, width=width, cell=cell)

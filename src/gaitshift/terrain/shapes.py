@@ -18,7 +18,7 @@ STEP_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
 """Of the single step."""
 
 _RUN = Quantity(name="run", unit="m", low=0.05, high=5.0)
-_FLIGHT = Quantity(name="flight", unit="steps", low=1, high=1000)
+_FLIGHT = Quantity(name="flight", unit="steps", low=1.0, high=1000.0)
 _LANDING = Quantity(name="landing", unit="m", low=0.05, high=100.0)
 
 
@@ -70,7 +70,7 @@ def stairs(
     """
     RISE.check(rise)
     _RUN.check(run)
-    _FLIGHT.check(flight)
+    _FLIGHT.check(float(flight))
     _LANDING.check(landing)
     grid = Grid(length=length, width=width, cell=cell)
     room = length / 2 - 1.5 * landing

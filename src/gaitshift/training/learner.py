@@ -128,6 +128,7 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         gamma=config.discount,
         lam=config.gae_lambda,
         entropy_coef=config.entropy,
+        use_clipped_value_loss=config.clip_values,
         learning_rate=config.learning_rate,
         schedule="adaptive" if config.desired_kl > 0 else "fixed",
         desired_kl=config.desired_kl,

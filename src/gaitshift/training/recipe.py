@@ -22,6 +22,8 @@ class PpoConfig:
     """λ of generalised advantage estimation."""
     clip: float = 0.2
     """Clipping of the probability ratio."""
+    clip_values: bool = False
+    """Whether the value loss is clipped too; ours: no, since values are far larger than `clip`."""
     learning_rate: float = 1e-3
     """First learning rate; it follows `desired_kl` from there."""
     desired_kl: float = 0.01

@@ -1,7 +1,6 @@
 """N robots on a terrain: joint targets in, `Motion` out."""
 
-from gaitshift.world.push import PushConfig, Pusher
-from gaitshift.world.scene import build_model
-from gaitshift.world.world import World
-
-__all__ = ["PushConfig", "Pusher", "World", "build_model"]
+from gaitshift.world.push import PushConfig as PushConfig
+from gaitshift.world.push import Pusher as Pusher
+from gaitshift.world.scene import build_model as build_model
+from gaitshift.world.world import World as World

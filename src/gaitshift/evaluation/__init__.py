@@ -1,0 +1,6 @@
+"""Runs trained robots many at a time: rollouts, evaluations, the demonstration."""
+
+from gaitshift.evaluation.evaluate import EvaluationConfig as EvaluationConfig
+from gaitshift.evaluation.evaluate import evaluate as evaluate
+from gaitshift.evaluation.rollout import RolloutConfig as RolloutConfig
+from gaitshift.evaluation.rollout import rollout as rollout

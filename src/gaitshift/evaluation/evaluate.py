@@ -1,0 +1,80 @@
+"""Judges one policy: many robots at once on a ground given by its spec."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.gait_analysis import measure, robot_mass
+from gaitshift.log import Log
+from gaitshift.policy import Policy
+from gaitshift.switching import Driver
+from gaitshift.terrain import Terrain, from_spec
+from gaitshift.world import PushConfig, World
+
+FIELDS = 8
+"""Different grounds that the robots share where the ground is random."""
+
+FIELD_WIDTH = 12.0
+"""[m]"""
+
+RUN_UP = 2.0
+"""Metres of ground behind the start."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluationConfig:
+    """What a policy is put through."""
+
+    terrain: str = "flat"
+    """Spec of the ground: flat, perlin:A, slope:DEG, stairs:H, step:H, pebbles:H, or a track."""
+    episodes: int = 256
+    """Robots, each running one episode, all at once."""
+    seconds: float = 10.0
+    """Length of an episode [s]."""
+    push: float = 0.0
+    """Largest push on the base, 0.2 s long, every 2 s [N]."""
+    seed: int = 0
+    """Seed of grounds, starting noise and pushes."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.episodes <= 100_000:
+            raise GaitshiftError(f"{self.episodes} episodes: 1 to 100000 would be right")
+        if not 0 < self.seconds <= 3600:
+            raise GaitshiftError(f"{self.seconds} seconds: more than 0, up to 3600 would be right")
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+
+
+def evaluate(
+    policy: Policy,
+    config: EvaluationConfig,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[dict[str, float | list[float]], Log]:
+    """Runs the deterministic policy and measures it (`gait_analysis.measure`)."""
+    rng = np.random.default_rng(config.seed)
+    run = RolloutConfig(
+        seconds=config.seconds,
+        speed=policy.info.forward_speed,
+        push=PushConfig(force=config.push),
+    )
+    driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
+    world = World(policy.robot, _grounds(config, run), config.episodes, gains=policy.info.gains)
+    start = np.zeros((config.episodes, 2))
+    # Spread over the width, so that robots on one field do not walk over the same ground.
+    start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, config.episodes)
+    log = rollout(world, driver, run, start_xy=start, rng=rng, report=report)
+    machines = {policy.gait: policy.machine}
+    return measure(log, machines, mass=robot_mass(policy.robot.name)), log
+
+
+def _grounds(config: EvaluationConfig, run: RolloutConfig) -> list[Terrain]:
+    length = 2 * RUN_UP + 1.25 * run.speed * run.seconds
+    first = from_spec(config.terrain, seed=config.seed, length=length, width=FIELD_WIDTH)
+    if first.is_flat:
+        return [first.moved(-RUN_UP, 0.0)]
+    seeds = range(FIELDS * config.seed, FIELDS * (config.seed + 1))
+    grounds = (from_spec(config.terrain, seed=s, length=length, width=FIELD_WIDTH) for s in seeds)
+    return [ground.moved(-RUN_UP, 0.0) for ground in grounds]

@@ -1,0 +1,134 @@
+"""Runs N robots with their drivers and switchers, and keeps the log."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.command import PAPER_SPEED, Command, HeadingLoop
+from gaitshift.log import Log
+from gaitshift.motion import Motion
+from gaitshift.switching import Decision, Driver, Switcher
+from gaitshift.world import PushConfig, Pusher, World
+
+
+@dataclass(frozen=True, kw_only=True)
+class RolloutConfig:
+    """How robots are run."""
+
+    seconds: float
+    """Length of the run [s]."""
+    speed: float = PAPER_SPEED
+    """Commanded forward speed [m/s]."""
+    heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
+    """Keeps robots on their line along x."""
+    push: PushConfig = field(default_factory=PushConfig)
+    """Disturbances."""
+    joint_noise: float = 0.1
+    """Joints start within ± this of the stance [rad]."""
+
+    @property
+    def steps(self) -> int:
+        """Control steps of the run."""
+        return max(1, round(self.seconds * 100))
+
+
+def rollout(
+    world: World,
+    driver: Driver,
+    config: RolloutConfig,
+    *,
+    start_xy: Float[np.ndarray, "N 2"],
+    rng: np.random.Generator,
+    switcher: Switcher | None = None,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> Log:
+    """Runs all robots of `world` along x from `start_xy` [m], each on its own line.
+
+    `report` is called with the steps done and the steps in all.
+    """
+    n = world.n
+    noise = rng.uniform(-config.joint_noise, config.joint_noise, (n, 12))
+    stance = driver.robot.stance_angles
+    world.place(np.arange(n), xy=start_xy, yaw=np.zeros(n), joint_position=stance + noise)
+    pusher = Pusher(config.push, n, rng)
+    recorder = _Recorder(world, driver)
+    fallen = np.zeros(n, dtype=bool)
+    command = _command(config, world.motion, start_xy)
+    for step in range(config.steps):
+        target = driver.act(world.motion, command)
+        target[fallen] = stance
+        world.push(pusher.step())
+        motion = world.step(target)
+        fallen = fallen | motion.body_contact
+        driver.see(motion)
+        decision = None
+        if switcher is not None:
+            decision = switcher.step((step + 1) / 100, motion, driver)
+        recorder.add(motion, command, decision, fallen)
+        command = _command(config, motion, start_xy)
+        if step % 25 == 24:
+            report(step + 1, config.steps)
+    report(config.steps, config.steps)
+    return recorder.log()
+
+
+def _command(
+    config: RolloutConfig, motion: Motion, start_xy: Float[np.ndarray, "N 2"]
+) -> Command:
+    lateral = motion.base_position_w[:, 1] - start_xy[:, 1]
+    yaw_rate = config.heading_loop.yaw_rate(motion.yaw, np.zeros(len(lateral)), lateral)
+    return Command(forward_speed=np.full(len(lateral), config.speed), yaw_rate=yaw_rate)
+
+
+class _Recorder:
+    """Collects what a `Log` is made of."""
+
+    def __init__(self, world: World, driver: Driver) -> None:
+        self._world = world
+        self._driver = driver
+        self._columns: dict[str, list[np.ndarray]] = {}
+
+    def add(
+        self,
+        motion: Motion,
+        command: Command,
+        decision: Decision | None,
+        fallen: np.ndarray,
+    ) -> None:
+        driver, n = self._driver, self._world.n
+        qpos, qvel = self._world.state()
+        nothing = np.zeros(n)
+        row = {
+            "qpos": qpos,
+            "qvel": qvel,
+            "torque": motion.joint_torque,
+            "contact": motion.contact,
+            "foot_position_w": motion.foot_position_w,
+            "clearance": motion.clearance,
+            "foot_height": np.zeros((n, 4)) if decision is None else decision.foot_height,
+            "k": nothing if decision is None else decision.k,
+            "threshold": nothing if decision is None else decision.threshold,
+            "gait": driver.gait.copy(),
+            "machine_state": driver.machine_state.copy(),
+            "stance_shown": driver.stance_shown(motion),
+            "fallen": fallen.copy(),
+            "command": np.stack([command.forward_speed, command.yaw_rate], axis=1),
+        }
+        for name, value in row.items():
+            self._columns.setdefault(name, []).append(value)
+
+    def log(self) -> Log:
+        terrain = self._world.terrains[0]
+        columns = {name: np.stack(values) for name, values in self._columns.items()}
+        return Log(
+            time=np.arange(1, len(columns["k"]) + 1) / 100,
+            **columns,
+            gaits=self._driver.gaits,
+            robot=self._driver.robot.name,
+            terrain=terrain.name,
+            terrain_height=terrain.height,
+            terrain_size=np.array(terrain.size),
+            terrain_origin=np.array(terrain.origin),
+        )

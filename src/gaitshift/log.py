@@ -1,0 +1,89 @@
+"""What a run of N robots left behind, step by step: the one format of `--log FILE.npz`."""
+
+import zipfile
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.errors import GaitshiftError
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Log:
+    """T control steps of N robots. Time comes first, then the robot, then the leg or joint.
+
+    Entry t is the motion after control step t: what the controllers saw before their next action.
+    """
+
+    time: Float[np.ndarray, " T"]
+    """[s] from the start of the run."""
+    qpos: Float[np.ndarray, "T N 19"]
+    """MuJoCo's positions: base position [m], base quaternion (w, x, y, z), joint angles [rad]."""
+    qvel: Float[np.ndarray, "T N 18"]
+    """Base velocity, world frame [m/s]; base angular velocity, body frame [rad/s]; joints [rad/s]."""
+    torque: Float[np.ndarray, "T N 12"]
+    """Joint torques [N·m]."""
+    contact: Bool[np.ndarray, "T N 4"]
+    """Whether each foot touches."""
+    foot_position_w: Float[np.ndarray, "T N 4 3"]
+    """Lowest point of each foot, world frame [m]."""
+    clearance: Float[np.ndarray, "T N 4"]
+    """Height of that point above the ground under it [m]."""
+    foot_height: Float[np.ndarray, "T N 4"]
+    """The shift condition's h_i: height of each foot at its last touch, in the condition's frame [m]."""
+    k: Float[np.ndarray, "T N"]
+    """The shift condition's counter, before a firing sets it back to 0."""
+    threshold: Float[np.ndarray, "T N"]
+    """β (or the reverse rule's) that k is held against."""
+    gait: Int[np.ndarray, "T N"]
+    """Index into `gaits` of the gait that acts next."""
+    machine_state: Int[np.ndarray, "T N"]
+    """State of that gait's machine."""
+    stance_shown: Bool[np.ndarray, "T N"]
+    """Whether the contacts are a stance set of that gait's machine."""
+    fallen: Bool[np.ndarray, "T N"]
+    """Whether the robot has fallen by now; it lies where it fell, and counts no more."""
+    command: Float[np.ndarray, "T N 2"]
+    """Commanded forward speed [m/s] and yaw rate [rad/s]."""
+    gaits: tuple[str, ...]
+    """Names of the gaits."""
+    robot: str
+    """Name of the robot."""
+    terrain: str
+    """Spec of the ground."""
+    terrain_height: Float[np.ndarray, "rows cols"]
+    """Heights of the ground, rows along +y, columns along +x [m]; the first one's where robots
+    stood on several."""
+    terrain_size: Float[np.ndarray, " 2"]
+    """Length along x and width along y of the ground [m]."""
+    terrain_origin: Float[np.ndarray, " 2"]
+    """World x, y of its first sample [m]."""
+
+    def save(self, path: Path) -> None:
+        """Writes a compressed npz file, whole or not at all."""
+        part = path.with_suffix(".part.npz")
+        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        np.savez_compressed(part, **arrays)
+        part.replace(path)
+
+    @classmethod
+    def load(cls, path: Path) -> "Log":
+        """Reads what `save` wrote.
+
+        Raises:
+            GaitshiftError: no such file, not an npz file, or an array is missing.
+        """
+        try:
+            with np.load(path) as file:
+                arrays = {name: file[name] for name in file.files}
+        except FileNotFoundError as error:
+            raise GaitshiftError(f"no log file {path}") from error
+        except (OSError, ValueError, zipfile.BadZipFile) as error:
+            raise GaitshiftError(f"{path} is not a whole npz file: {error}") from error
+        missing = [f.name for f in fields(cls) if f.name not in arrays]
+        if missing:
+            raise GaitshiftError(f"{path} is no log of gaitshift: it lacks '{missing[0]}'")
+        texts = {name: str(arrays[name]) for name in ("robot", "terrain")}
+        return cls(**{**arrays, **texts, "gaits": tuple(str(name) for name in arrays["gaits"])})

@@ -1,0 +1,106 @@
+"""Drives N robots, each in the gait of the moment: machine, observation, policy, joint target."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.command import Command
+from gaitshift.errors import GaitshiftError
+from gaitshift.motion import Motion
+from gaitshift.observation import Situation
+from gaitshift.policy import Policy
+from gaitshift.robot import Robot
+
+
+class Driver:
+    """One policy and one machine a gait, and which of them each robot uses now.
+
+    A change of gait replaces policy and machine at once (paper III-E); the new machine starts in
+    the state that fits the present contacts best (ours, the paper is silent).
+    """
+
+    def __init__(self, policies: Mapping[str, Policy], n: int, *, start: str) -> None:
+        """All n robots begin in the gait `start`, in its machine's initial state."""
+        self.policies = dict(policies)
+        self.gaits = tuple(self.policies)
+        self._check(start)
+        self.n = n
+        self._machines = tuple(policy.machine for policy in self.policies.values())
+        self.gait: Int[np.ndarray, " N"] = np.full(n, self.gaits.index(start))
+        self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
+        self.machine_state[:] = self._machines[self.gaits.index(start)].initial
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that all policies were trained for."""
+        return next(iter(self.policies.values())).robot
+
+    @property
+    def gains(self) -> str:
+        """The preset of joint gains that all policies were trained with."""
+        return next(iter(self.policies.values())).info.gains
+
+    def see(self, motion: Motion) -> None:
+        """Moves every robot's machine on by what its feet did in the step that ended."""
+        for index, ids in self._groups():
+            state, changed, _ = self._machines[index].step(
+                self.machine_state[ids],
+                motion.contact[ids],
+                motion.clearance[ids],
+                self.steps_in_state[ids],
+            )
+            self.machine_state[ids] = state
+            self.steps_in_state[ids] = np.where(changed, 0, self.steps_in_state[ids] + 1)
+
+    def switch(self, ids: Int[np.ndarray, " K"], gait: str, motion: Motion) -> None:
+        """Robots `ids` take up another gait at once; those already in it are left alone."""
+        index = self.gaits.index(gait)
+        ids = ids[self.gait[ids] != index]
+        self.gait[ids] = index
+        self.machine_state[ids] = self._machines[index].enter(motion.contact[ids])
+        self.steps_in_state[ids] = 0
+
+    def act(self, motion: Motion, command: Command) -> Float[np.ndarray, "N 12"]:
+        """Joint targets [rad] for the next control step."""
+        target = np.empty((self.n, 12))
+        for index, ids in self._groups():
+            policy = self.policies[self.gaits[index]]
+            whole = len(ids) == self.n
+            situation = Situation(
+                machine_state=self.machine_state[ids],
+                steps_in_state=self.steps_in_state[ids],
+                motion=motion if whole else motion.of(ids),
+                command=command if whole else command.of(ids),
+                last_action=self._last_action[ids],
+                stance=policy.robot.stance_angles,
+            )
+            action = policy(policy.observation(situation)).astype(np.float64)
+            self._last_action[ids] = action
+            target[ids] = policy.target(action)
+        return target
+
+    def stance_shown(self, motion: Motion) -> Bool[np.ndarray, " N"]:
+        """Whether the feet in contact are a stance set of each robot's present gait."""
+        shown = np.empty(self.n, dtype=bool)
+        for index, ids in self._groups():
+            shown[ids] = self._machines[index].shows_stance(motion.contact[ids])
+        return shown
+
+    def _groups(self) -> list[tuple[int, Int[np.ndarray, " K"]]]:
+        """Which robots use which gait, for the gaits in use."""
+        return [(int(index), np.flatnonzero(self.gait == index)) for index in np.unique(self.gait)]
+
+    def _check(self, start: str) -> None:
+        if start not in self.policies:
+            raise GaitshiftError(f"no policy for the gait '{start}'; known: {', '.join(self.gaits)}")
+        infos = [policy.info for policy in self.policies.values()]
+        for name, info in zip(self.gaits, infos, strict=True):
+            if (info.robot, info.gains) != (infos[0].robot, infos[0].gains):
+                raise GaitshiftError(
+                    f"the policy of {name} is for {info.robot} with gains '{info.gains}', that of "
+                    f"{self.gaits[0]} for {infos[0].robot} with gains '{infos[0].gains}': "
+                    "robots cannot change body or gains in a shift"
+                )
