@@ -11,7 +11,7 @@ from itertools import chain, combinations, permutations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gaitshift.errors import GaitshiftError
@@ -92,6 +92,9 @@ def machines(draw_from):
     transitions = []
     for source, target in ends:
         stance = stances[target] if target < count else pick(st.sampled_from(PATTERNS))
+        joined = [t for t in transitions if (t["from"], t["to"]) == (f"u{source}", f"u{target}")]
+        if joined:
+            stance = pick(st.sampled_from(PATTERNS))
         for freed in (pick(st.sets(st.sampled_from(FEET))), set()):
             one = {
                 "from": f"u{source}",
@@ -223,8 +226,35 @@ def slow_mirrors(tables):
             yield images
 
 
-@quick
-@given(machines())
+@st.composite
+def nearly_symmetric_machines(draw_from):
+    """A ring whose second half mirrors the first, as gaits do, with perhaps one thing changed."""
+    half = draw_from(st.lists(st.sampled_from(PATTERNS), min_size=1, max_size=2))
+    ring = half + [{MIRROR[foot] for foot in stance} for stance in half]
+    assume(all(ring[i] != ring[i - 1] for i in range(len(ring))))
+    extras = [draw_from(EXTRAS) for _ in half] * 2
+    states = [{"name": f"u{i}", "stance": sorted(s)} for i, s in enumerate(ring)]
+    transitions = [
+        {
+            "from": f"u{i - 1 if i else len(ring) - 1}",
+            "to": f"u{i}",
+            "down": sorted(stance),
+            "up": sorted(set(FEET) - stance),
+        }
+        | extras[i]
+        for i, stance in enumerate(ring)
+    ]
+    transitions[-1] |= draw_from(st.just({}) | EXTRAS)
+    flight = {"from": "u0", "to": "end", "down": [], "up": list(FEET)}
+    if draw_from(st.booleans()) and set() not in ring:
+        states.append({"name": "end", "accepting": True})
+        twin = flight | {"from": f"u{len(half)}"}
+        transitions += [flight] if draw_from(st.booleans()) else [flight, twin]
+    return TROT | {"state": states, "transition": transitions}
+
+
+@settings(max_examples=200, deadline=None)
+@given(machines() | nearly_symmetric_machines())
 def test_mirrored_states_are_those_that_trying_all_permutations_finds(tables):
     found = RewardMachine.from_dict(tables).mirrored_states()
     mirrors = list(slow_mirrors(tables))
@@ -236,6 +266,19 @@ def test_trot_in_the_mirror_is_trot_with_its_states_swapped():
     assert trot.mirrored_states() == (1, 0)
     assert trot.mirrored().states == trot.states[::-1]
     assert trot.mirrored().ideal_phase == (0.5, 0.0, 0.0, 0.5)
+
+
+def test_a_machine_is_not_its_own_mirror_for_its_guards_alone():
+    ways = [
+        {"from": "one", "to": "two", "down": ["FR"], "up": ["FL"]},
+        {"from": "two", "to": "one", "down": ["FL"], "up": ["FR"]},
+    ]
+    states = [{"name": "one", "stance": ["FL"]}, {"name": "two", "stance": ["FR", "BL"]}]
+    machine = RewardMachine.from_dict(edited(state=states, transition=ways))
+    assert machine.mirrored_states() is None
+    states[1]["stance"] = ["FR"]
+    machine = RewardMachine.from_dict(edited(state=states, transition=ways))
+    assert machine.mirrored_states() == (1, 0)
 
 
 # Trot by hand -----------------------------------------------------------------------------------
@@ -318,7 +361,7 @@ def test_an_accepting_state_is_never_entered_left_or_shown():
     assert machine.initial == 0
     assert machine.accepting == (2,)
     flight = contacts("")
-    assert machine.enter(flight).tolist() == [0]
+    assert machine.enter(contacts("", "FL FR BL BR")).tolist() == [0, 0]
     assert not machine.shows_stance(flight)[0]
     assert machine.step(ints(1), flight, high(1), ints(30)).state.tolist() == [2]
     for pattern in PATTERNS:
@@ -433,6 +476,14 @@ def test_guards_that_differ_in_dwell_or_height_alone_can_hold_at_once():
     twin = TROT["transition"][0] | {"dwell": 5, "swing_height": 0.1}
     with pytest.raises(GaitshiftError, match=r"can hold at once, with FR BL down"):
         RewardMachine.from_dict(edited(transition=[*TROT["transition"], twin]))
+
+
+def test_two_states_may_be_joined_by_guards_that_exclude_each_other():
+    loose = {"from": "FL_BR", "to": "FR_BL", "down": ["FR", "BL", "FL"], "up": [], "dwell": 30}
+    machine = RewardMachine.from_dict(edited(transition=[*TROT["transition"], loose]))
+    label = contacts("FR BL", "FR BL FL", "FR BL FL", "FR BL BR")
+    told = machine.step(ints(0, 0, 0, 0), label, high(4), ints(20, 20, 30, 30))
+    assert told.changed.tolist() == [True, False, True, False]
 
 
 def test_a_machine_made_in_code_keeps_the_same_laws():

@@ -42,11 +42,13 @@ def rollout(
     start_xy: Float[np.ndarray, "N 2"],
     rng: np.random.Generator,
     switcher: Switcher | None = None,
+    finish_x: float = np.inf,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
     """Runs all robots of `world` along x from `start_xy` [m], each on its own line.
 
-    `report` is called with the steps done and the steps in all.
+    The run ends early when every robot has fallen or passed `finish_x` [m]. `report` is called with
+    the steps done and the steps in all.
     """
     n = world.n
     noise = rng.uniform(-config.joint_noise, config.joint_noise, (n, 12))
@@ -70,6 +72,8 @@ def rollout(
         command = _command(config, motion, start_xy)
         if step % 25 == 24:
             report(step + 1, config.steps)
+            if (fallen | (motion.base_position_w[:, 0] > finish_x)).all():
+                break
     report(config.steps, config.steps)
     return recorder.log()
 

@@ -4,8 +4,9 @@
 2. A state has a way out, or it is accepting and has none.
 3. Every state is reached from the initial one.
 4. Two guards of one source state never hold at once, so δu is a function.
-5. An edge shows its target: its guard suits the target's stance and not the source's, or standing
-   still in a stance would leave its state. So a state is the stance that was shown last.
+5. A guard does not hold in the stance of its source, or standing still would leave the state; and
+   one guard on the way between two states holds in the stance of the target. So a state is the
+   stance that was shown last.
 """
 
 from itertools import combinations
@@ -75,6 +76,11 @@ def _check_one_at_a_time(edges: tuple[Edge, ...]) -> None:
 
 
 def _check_stances(states: dict[str, State], edges: tuple[Edge, ...]) -> None:
+    shown = {
+        (edge.source, edge.target)
+        for edge in edges
+        if edge.guard.holds_in(states[edge.target].stance) or states[edge.target].accepting
+    }
     for number, edge in enumerate(edges, start=1):
         source, target = states[edge.source], states[edge.target]
         if edge.guard.holds_in(source.stance):
@@ -82,7 +88,7 @@ def _check_stances(states: dict[str, State], edges: tuple[Edge, ...]) -> None:
                 f"{_title(number, edge)}: the guard holds in the stance of {source.name} itself,"
                 f" {source.stance_text()}, which would be left without a step"
             )
-        if not target.accepting and not edge.guard.holds_in(target.stance):
+        if (edge.source, edge.target) not in shown:
             raise GaitshiftError(
                 f"{_title(number, edge)}: the guard does not hold in the stance of {target.name},"
                 f" {target.stance_text()}, which it leads to"

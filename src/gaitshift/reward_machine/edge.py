@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass
-from typing import Self
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine.feet import in_leg_order, mirrored_name
@@ -58,7 +57,7 @@ class Edge:
         }
 
     @classmethod
-    def from_dict(cls, data: object, *, number: int, dwell: int, swing_height: float) -> Self:
+    def from_dict(cls, data: object, *, number: int, dwell: int, swing_height: float) -> "Edge":
         """Read the table [[transition]], the `number`-th of its file.
 
         Dwell [control steps] and swing height [m] are the file's own, for an edge that names none.

@@ -1,7 +1,6 @@
 """A machine turned into arrays, so that N robots step by gathering and not by looping."""
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -57,7 +56,7 @@ class Lookup:
     """State whose stance agrees with a label on most feet, the lowest where several do."""
 
     @classmethod
-    def of(cls, states: tuple[State, ...], edges: tuple[Edge, ...], *, dwell: int) -> Self:
+    def of(cls, states: tuple[State, ...], edges: tuple[Edge, ...], *, dwell: int) -> "Lookup":
         """Build the arrays of a checked machine whose own dwell is `dwell` [control steps]."""
         index = {state.name: u for u, state in enumerate(states)}
         suits = np.full((len(states), LABEL_COUNT), len(edges))
@@ -85,4 +84,4 @@ class Lookup:
 def _fitting_states(stance: Int[np.ndarray, " states"]) -> Int[np.ndarray, " 16"]:
     contact = contact_of(np.arange(LABEL_COUNT))
     agreeing = (contact[:, None] == contact_of(stance)).sum(axis=-1)
-    return agreeing.argmax(axis=1)
+    return np.where(stance < 0, -1, agreeing).argmax(axis=1)

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -189,7 +189,7 @@ class RewardMachine:
         }
 
     @classmethod
-    def from_dict(cls, data: object) -> Self:
+    def from_dict(cls, data: object) -> "RewardMachine":
         """Build the machine that `to_dict` or a gait file describes, checked in full.
 
         Raises `GaitshiftError` with one line that names the table and the key.

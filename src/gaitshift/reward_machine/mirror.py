@@ -1,5 +1,7 @@
 """How a machine looks in a mirror that swaps left and right."""
 
+from dataclasses import replace
+
 from gaitshift.reward_machine.edge import Edge
 from gaitshift.reward_machine.state import State
 
@@ -8,38 +10,38 @@ def mirrored_states(states: tuple[State, ...], edges: tuple[Edge, ...]) -> tuple
     """State u in the mirror is state `result[u]`; None where the mirror shows another machine.
 
     Of a checked machine: every state is reached from the first and guards exclude each other, so
-    the image of the first state settles all others.
+    the image of the first state settles those of all others.
     """
     names = [state.name for state in states]
-    for image in names:
-        images = _images_from(states, edges, image)
-        if images is not None and len(set(images.values())) == len(names):
+    for image_of_first in names:
+        images = _images(states[0].name, image_of_first, edges)
+        if images is not None and _is_mirror(images, states, edges):
             return tuple(names.index(images[name]) for name in names)
     return None
 
 
-def _images_from(
-    states: tuple[State, ...], edges: tuple[Edge, ...], image_of_first: str
-) -> dict[str, str] | None:
-    by_name = {state.name: state for state in states}
-    images = {states[0].name: image_of_first}
-    waiting = [states[0].name]
+def _images(first: str, image_of_first: str, edges: tuple[Edge, ...]) -> dict[str, str] | None:
+    """Follow every edge and its mirror image side by side; None where there is no such edge."""
+    targets = {(edge.source, edge.guard): edge.target for edge in edges}
+    images, waiting = {first: image_of_first}, [first]
     while waiting:
         name = waiting.pop()
-        one, other = by_name[name].mirrored(), by_name[images[name]]
-        if (one.stance, one.accepting) != (other.stance, other.accepting):
-            return None
-        ways = {e.guard: e for e in edges if e.source == other.name}
-        out = [e for e in edges if e.source == name]
-        if len(out) != len(ways):
-            return None
-        for edge in out:
-            twin = ways.get(edge.guard.mirrored())
-            if twin is None or twin.bonus != edge.bonus:
+        for edge in (edge for edge in edges if edge.source == name):
+            target = targets.get((images[name], edge.guard.mirrored()))
+            if target is None:
                 return None
             if edge.target not in images:
-                images[edge.target] = twin.target
+                images[edge.target] = target
                 waiting.append(edge.target)
-            elif images[edge.target] != twin.target:
-                return None
     return images
+
+
+def _is_mirror(images: dict[str, str], states: tuple[State, ...], edges: tuple[Edge, ...]) -> bool:
+    carried = {
+        replace(edge.mirrored(), source=images[edge.source], target=images[edge.target])
+        for edge in edges
+    }
+    stances = {state.name: state.stance for state in states}
+    return carried == set(edges) and all(
+        state.mirrored().stance == stances[images[state.name]] for state in states
+    )

@@ -29,7 +29,7 @@ _DOWN, _UP = "#0072b2", "#c04f00"
 _FOOT = {"FL": (-1, 1), "FR": (1, 1), "BL": (-1, -1), "BR": (1, -1)}
 """Where a foot is drawn: to the right of the body, towards its nose."""
 
-_CARD, _END_CARD = (1.7, 2.1), (1.5, 0.9)
+_CARD, _END_CARD = (1.7, 2.1), (1.7, 0.9)
 _NEIGHBOURS = 5.0
 _BULGE = -0.28
 _INCHES = 0.62
@@ -131,7 +131,7 @@ def _draw_state(axes: "Axes", state: State, middle: tuple[float, float]) -> "Fan
 
 def _draw_name(axes: "Axes", name: str, middle: tuple[float, float]) -> None:
     """Draw a state's name, a long one small enough for its card."""
-    axes.text(*middle, name, ha="center", va="center", size=min(9, 125 / len(name)), color=_INK)
+    axes.text(*middle, name, ha="center", va="center", size=min(9, 108 / len(name)), color=_INK)
 
 
 def _draw_box(

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from typing import Self
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine.feet import (
@@ -60,7 +59,7 @@ class State:
         )
 
     @classmethod
-    def from_dict(cls, data: object, *, number: int) -> Self:
+    def from_dict(cls, data: object, *, number: int) -> "State":
         """Read the table [[state]], the `number`-th of its file; raises `GaitshiftError`."""
         with located(f"state {number}"):
             table = Table(data, keys=("name", "stance", "accepting"))

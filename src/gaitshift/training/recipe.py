@@ -30,7 +30,7 @@ class PpoConfig:
     """KL divergence an update aims at."""
     entropy: float = 0.003
     """Weight of the entropy bonus; ours."""
-    initial_std: float = 0.8
+    initial_std: float = 0.5
     """First standard deviation of the actions; ours."""
     reward_scale: float = 0.02
     """Rewards are scaled by this inside PPO alone; ours: values near 1 to 100 with b = 200."""

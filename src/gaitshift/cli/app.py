@@ -1,0 +1,49 @@
+"""Reads the command line, runs the subcommand, turns errors into one line and an exit code."""
+
+import sys
+from typing import Annotated
+
+import tyro
+
+from gaitshift.cli.bench import Bench
+from gaitshift.cli.demo import Demo
+from gaitshift.cli.evaluate import Evaluate
+from gaitshift.cli.gaits import Gaits
+from gaitshift.cli.output import say
+from gaitshift.cli.train import Train
+from gaitshift.errors import GaitshiftError
+
+Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Gaits, tyro.conf.subcommand("gaits")]
+    | Annotated[Train, tyro.conf.subcommand("train")]
+    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+)
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Runs the command line; ends the process with 0, 2 (bad input) or 130 (Ctrl-C)."""
+    try:
+        command: Command = tyro.cli(
+            Command,  # pyright: ignore[reportArgumentType]  (tyro takes unions of annotated types)
+            prog="gaitshift",
+            description=(
+                "Quadruped gaits as reward machines, trained in minutes on a CPU, and shifted by "
+                "the robot itself."
+            ),
+            args=arguments,
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
+        )
+        command.run()
+    except GaitshiftError as error:
+        say(f"gaitshift: {error}")
+        sys.exit(2)
+    except KeyboardInterrupt:
+        say("gaitshift: interrupted")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.exit(0)

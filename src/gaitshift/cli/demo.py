@@ -1,0 +1,131 @@
+"""`gaitshift demo`: a robot that shifts its gait by itself, as a folder to look at."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from gaitshift import policy
+from gaitshift.cli.output import emit_json, emit_table, prepare_folder, progress, say
+from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import DemoConfig, run_demo
+from gaitshift.log import Log
+
+VIDEO, PICTURE, LOG, SUMMARY = "demo.mp4", "demo.png", "log.npz", "summary.json"
+
+
+def _split(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())
+
+
+def _split_numbers(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in _split(text))
+    except ValueError:
+        raise GaitshiftError(f"times '{text}': numbers with commas between, like 2,5,8") from None
+
+
+_names = tyro.constructors.PrimitiveConstructorSpec[tuple[str, ...]](
+    nargs=1,
+    metavar="GAIT,GAIT,…",
+    instance_from_str=lambda args: _split(args[0]),
+    is_instance=lambda instance: isinstance(instance, tuple),
+    str_from_instance=lambda instance: [",".join(instance)],
+)
+_numbers = tyro.constructors.PrimitiveConstructorSpec[tuple[float, ...]](
+    nargs=1,
+    metavar="S,S,…",
+    instance_from_str=lambda args: _split_numbers(args[0]),
+    is_instance=lambda instance: isinstance(instance, tuple),
+    str_from_instance=lambda instance: [",".join(map(str, instance))],
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Demo(DemoConfig):
+    """Watch a robot cross flat and rough ground and shift its gait by itself."""
+
+    gaits: Annotated[tuple[str, ...], _names] = ()
+    """Gaits to show in a row instead, on a schedule and without the condition, such as
+    trot,bound,pace,trot."""
+    at: Annotated[tuple[float, ...], _numbers] = ()
+    """Times of the shifts to the second of these gaits and on [s], such as 2,5,8; else every
+    `every` seconds."""
+    out: Path = Path("gaitshift-demo")
+    """Folder for demo.mp4, demo.png, log.npz and summary.json."""
+    overwrite: bool = False
+    """Replace these files in a folder that is not empty."""
+    video: bool = True
+    """Render the video; it takes most of the time."""
+    json: bool = False
+    """One JSON object on stdout: the summary."""
+
+    def run(self) -> None:
+        """Runs, draws, and says where to look."""
+        policies = {gait: policy.load(gait) for gait in self.used}
+        files = (VIDEO, PICTURE, LOG, SUMMARY)
+        prepare_folder(self.out, overwrite=self.overwrite, ours=files)
+        with progress("walking") as report:
+            log, summaries = run_demo(self, policies, report)
+        summary = self._summary(summaries)
+        log.save(self.out / LOG)
+        (self.out / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n")
+        self._draw(log)
+        written = [SUMMARY, PICTURE, LOG]
+        if self.video and self._render(log):
+            written.insert(0, VIDEO)
+        if self.json:
+            emit_json(summary)
+            return
+        _print(summary)
+        print(f"look into {self.out}: {', '.join(written)}")
+
+    def _summary(self, summaries: list[dict[str, Any]]) -> dict[str, Any]:
+        """The first robot's summary, and what became of all of them where there are several."""
+        summary = {"seed": self.seed, **summaries[0]}
+        if len(summaries) == 1:
+            return summary
+        shifts = [[(s["from"], s["to"]) for s in one["switches"]] for one in summaries]
+        return {
+            **summary,
+            "episodes": len(summaries),
+            "survived_count": sum(one["survived"] for one in summaries),
+            "as_first_count": sum(
+                one["survived"] and shift == shifts[0]
+                for one, shift in zip(summaries, shifts, strict=True)
+            ),
+            "all": summaries,
+        }
+
+    def _draw(self, log: Log) -> None:
+        from gaitshift.plots import demo_figure  # matplotlib is slow to import
+
+        demo_figure(log, self.out / PICTURE)
+
+    def _render(self, log: Log) -> bool:
+        from gaitshift.video import VideoUnavailable, render
+
+        try:
+            with progress("filming") as report:
+                render(log, self.out / VIDEO, report=report)
+        except VideoUnavailable as error:
+            say(f"no video: {error}")
+            return False
+        return True
+
+
+def _print(summary: dict[str, Any]) -> None:
+    rows = [
+        ("survived", "yes" if summary["survived"] else "no"),
+        ("distance", f"{summary['distance_m']:.1f} m in {summary['time_s']:.1f} s"),
+        ("mean speed", f"{summary['mean_speed_m_s']:.2f} m/s"),
+    ]
+    for shift in summary["switches"]:
+        where = f"{shift['from']} → {shift['to']}"
+        rows.append(("shift", f"{where} at {shift['x_m']:.1f} m, {shift['time_s']:.1f} s"))
+    if "episodes" in summary:
+        rows.append(("robots on their feet", f"{summary['survived_count']}/{summary['episodes']}"))
+        rows.append(("same shifts as the first", f"{summary['as_first_count']}"))
+    emit_table("demo", rows)

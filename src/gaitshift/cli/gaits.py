@@ -1,0 +1,53 @@
+"""`gaitshift gaits`: lists the gaits and draws their machines."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from gaitshift import gaits, policy
+from gaitshift.cli.output import emit_json, prepare_folder, say
+from gaitshift.reward_machine import RewardMachine, draw, mermaid
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gaits:
+    """List the gaits, show one as a Mermaid diagram, or draw them as pictures."""
+
+    gait: Annotated[str | None, tyro.conf.Positional] = None
+    """A gait by its name, or a machine file ending in .toml; all shipped gaits by default."""
+    out: Path | None = None
+    """Draw each machine as a picture and a Mermaid file into this folder."""
+    overwrite: bool = False
+    """Draw into a folder that is not empty."""
+    json: bool = False
+    """One JSON object on stdout: the machines, whole."""
+
+    def run(self) -> None:
+        """Prints, and draws."""
+        names = gaits.names() if self.gait is None else (self.gait,)
+        machines = [gaits.load(name) for name in names]
+        if self.json:
+            emit_json({machine.name: machine.to_dict() for machine in machines})
+        elif self.gait is None:
+            for machine in machines:
+                print(_line(machine))
+        else:
+            print(mermaid(machines[0]))
+        if self.out is not None:
+            self._draw(self.out, machines)
+
+    def _draw(self, folder: Path, machines: list[RewardMachine]) -> None:
+        files = tuple(f"{machine.name}{end}" for machine in machines for end in (".png", ".mmd"))
+        prepare_folder(folder, overwrite=self.overwrite, ours=files)
+        for machine in machines:
+            draw(machine, folder / f"{machine.name}.png")
+            (folder / f"{machine.name}.mmd").write_text(mermaid(machine) + "\n")
+        say(f"drawn into {folder}: {', '.join(files)}")
+
+
+def _line(machine: RewardMachine) -> str:
+    cycle = " → ".join(state.name for state in machine.states)
+    shipped = "policy shipped" if machine.name in policy.shipped() else "no policy shipped"
+    return f"{machine.name:<10} {cycle:<24} {shipped:<18} {machine.description}"

@@ -1,0 +1,65 @@
+"""How commands speak: results on stdout, everything else on stderr."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from gaitshift.errors import GaitshiftError
+
+Report = Callable[[int, int], None]
+"""Takes the work done and the work in all."""
+
+
+def say(line: str) -> None:
+    """One line for people, on stderr."""
+    print(line, file=sys.stderr)
+
+
+def emit_json(data: Any) -> None:
+    """One JSON object on stdout."""
+    print(json.dumps(data, allow_nan=False))
+
+
+def emit_table(title: str, rows: list[tuple[str, str]]) -> None:
+    """A short table on stdout."""
+    table = Table(title=title, show_header=False, title_justify="left")
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Report]:
+    """A progress bar on stderr, with the time left; silent where stderr is no terminal."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TimeRemainingColumn(),
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def prepare_folder(folder: Path, *, overwrite: bool, ours: tuple[str, ...]) -> None:
+    """Makes an output folder; one with content is used only with `overwrite`.
+
+    Even then nothing is deleted: the files in `ours` will be replaced, others stay.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise GaitshiftError(f"{folder} is a file; give a folder with --out")
+    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+        raise GaitshiftError(
+            f"{folder} exists and is not empty; give another --out, or --overwrite to replace "
+            f"{', '.join(ours)} there"
+        )
+    folder.mkdir(parents=True, exist_ok=True)

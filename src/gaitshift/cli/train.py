@@ -1,0 +1,130 @@
+"""`gaitshift train`: a gait from its machine to a policy file."""
+
+import shlex
+import sys
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from gaitshift import gaits
+from gaitshift.cli.output import emit_json, say
+from gaitshift.errors import GaitshiftError
+
+if TYPE_CHECKING:
+    from gaitshift.training.run import Row, Run
+
+
+@dataclass(frozen=True, kw_only=True)
+class Train:
+    """Train a gait with PPO: flat ground first, then rough ground with pushes.
+
+    The folder gets config.json, progress.csv, tensorboard/, checkpoints/ and policy.onnx. Ctrl-C
+    leaves a folder that --resume goes on from.
+    """
+
+    gait: Annotated[str | None, tyro.conf.Positional] = None
+    """A gait by its name (see `gaitshift gaits`), or a machine file ending in .toml."""
+    preset: Literal["default", "paper"] = "default"
+    """Recipe: ours, or the paper's (Table I alone, 30 robots, Kp 3, Kd 0.2, flat ground)."""
+    robots: int | None = None
+    """Robots in parallel; the recipe's by default."""
+    iterations: int | None = None
+    """PPO iterations in all; the recipe's by default."""
+    seed: int = 0
+    """Seed of networks, exploration, grounds and pushes."""
+    out: Path | None = None
+    """Folder of the run; runs/GAIT-SEED by default."""
+    resume: Path | None = None
+    """Go on with the run of this folder; its own settings hold."""
+    overwrite: bool = False
+    """Replace an earlier run in the folder."""
+    json: bool = False
+    """One JSON object on stdout: the last line of progress.csv and the policy's path."""
+
+    def run(self) -> None:
+        """Trains, with a progress bar."""
+        run = self._open()
+        last: list[Row] = []
+        try:
+            with _Bar(run) as bar:
+                path = run.train(lambda row: (last.__setitem__(slice(None), [row]), bar(row))[1])
+        except KeyboardInterrupt:
+            say(f"gaitshift: interrupted; go on with: gaitshift train --resume {run.folder}")
+            sys.exit(130)
+        if self.json:
+            emit_json({**(last[0] if last else {}), "policy": str(path)})
+        else:
+            print(f"policy written to {path}; judge it with: gaitshift evaluate --policy {path}")
+
+    def _open(self) -> "Run":
+        try:
+            from gaitshift.training.recipe import PRESETS
+            from gaitshift.training.run import Run
+        except ImportError as error:
+            raise GaitshiftError(
+                f"training needs the package '{error.name}'; install gaitshift[train]"
+            ) from error
+        if self.resume is not None:
+            if self.gait is not None:
+                raise GaitshiftError("give a gait, or --resume with the folder of a run, not both")
+            return Run.resume(self.resume)
+        if self.gait is None:
+            known = ", ".join(gaits.names())
+            raise GaitshiftError(f"which gait? give one of {known}, a .toml file, or --resume DIR")
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+        machine = gaits.load(self.gait)
+        recipe = PRESETS[self.preset]()
+        if self.robots is not None:
+            recipe = replace(recipe, robots=self.robots)
+        if self.iterations is not None:
+            recipe = recipe.with_iterations(self.iterations)
+        folder = self.out or Path("runs") / f"{machine.name}-{self.seed}"
+        command = shlex.join(["gaitshift", *sys.argv[1:]])
+        return Run.create(
+            folder, machine, recipe, seed=self.seed, command=command, overwrite=self.overwrite
+        )
+
+
+class _Bar:
+    """Progress of a training: steps/s, speed, survival and time left."""
+
+    def __init__(self, run: "Run") -> None:
+        self._run = run
+        console = Console(stderr=True)
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f}/{task.total:.0f}"),
+            TextColumn("{task.fields[seen]}"),
+            TimeRemainingColumn(),
+            console=console,
+            disable=not console.is_terminal,
+        )
+        self._task = self._progress.add_task(
+            run.machine.name, total=run.recipe.iterations, completed=run.iteration, seen=""
+        )
+        self._clock = (time.perf_counter(), run.iteration)
+
+    def __enter__(self) -> "_Bar":
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def __call__(self, row: "Row") -> None:
+        start, first = self._clock
+        iterations = row["iteration"] - first
+        recipe = self._run.recipe
+        rate = iterations * recipe.robots * recipe.steps / (time.perf_counter() - start)
+        seen = (
+            f"{row['stage']}  {rate:,.0f} steps/s  {row['speed']:.2f} m/s  "
+            f"survival {row['survival']:.2f}"
+        )
+        self._progress.update(self._task, completed=row["iteration"], seen=seen)
