@@ -6,13 +6,16 @@ joints in the order legs × (HAA, HFE, KFE), and per leg the sensors this module
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.legs import JOINTS, LEGS
+
+if TYPE_CHECKING:
+    import mujoco
 
 _ROBOTS = Path(__file__).parent / "robots"
 
@@ -73,10 +76,15 @@ class Robot:
             raise GaitshiftError(f"robot {self.name} has no gains '{preset}'; known: {known}")
         return self.gains[preset]
 
-    def spec(self, gains: Gains) -> mujoco.MjSpec:
-        """The robot's model with these gains in its joint controllers, ready for a ground."""
+    def spec(self, gains: Gains) -> "mujoco.MjSpec":
+        """The robot's model with these gains in its joint controllers, ready for a ground.
+
+        MuJoCo is asked for here alone: a robot that runs policies needs no simulator.
+        """
+        import mujoco
+
         spec = mujoco.MjSpec.from_file(str(self.model_file))
-        for actuator in spec.actuators:
+        for actuator in cast("list[mujoco.MjsActuator]", spec.actuators):
             actuator.gainprm[0] = gains.kp
             actuator.biasprm[1:3] = (-gains.kp, -gains.kd)
         return spec

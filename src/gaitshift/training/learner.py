@@ -115,6 +115,8 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
     distribution = {"class_name": "GaussianDistribution", "init_std": config.initial_std}
     distribution["std_range"] = (0.05, 2.0)
     actor = MLPModel(observation, _GROUPS, "actor", 12, **network, distribution_cfg=distribution)
+    with torch.no_grad():  # the first actions are then nearly the stance
+        actor.mlp[-1].weight *= config.output_gain
     critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
     symmetric = config.mirror and env.machine.mirrored_states() is not None

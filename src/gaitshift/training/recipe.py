@@ -32,6 +32,8 @@ class PpoConfig:
     """Weight of the entropy bonus; ours."""
     initial_std: float = 0.5
     """First standard deviation of the actions; ours."""
+    output_gain: float = 0.01
+    """Factor on the actor's last weights at the start; Andrychowicz et al. 2021."""
     reward_scale: float = 0.02
     """Rewards are scaled by this inside PPO alone; ours: values near 1 to 100 with b = 200."""
     normalize_observations: bool = True
