@@ -54,7 +54,9 @@ def measure(
     return {
         "survival": float(1.0 - log.fallen[-1].mean()),
         "speed_mean": mean_speed,
-        "speed_rmse": float(np.sqrt(np.square(speed - command)[alive].mean())) if alive.any() else 0.0,
+        "speed_rmse": float(np.sqrt(np.square(speed - command)[alive].mean()))
+        if alive.any()
+        else 0.0,
         "pattern_fraction": float((log.stance_shown[late] & alive).sum() / steps),
         "cycles_per_s": float((cycles & alive).sum() / seconds),
         "touchdowns_per_cycle": [float(x) for x in onsets.sum(axis=(0, 1)) / count],
@@ -62,7 +64,9 @@ def measure(
         "slip": _slip(log, late, feet),
         "cost_of_transport": float(
             power[alive].mean() / (mass * GRAVITY * max(abs(mean_speed), 1e-3))
-        ) if alive.any() else 0.0,
+        )
+        if alive.any()
+        else 0.0,
         "heading_error_sd": float(_yaw(log)[late][alive].std()) if alive.any() else 0.0,
         "lateral_error_p95": _lateral_error(log),
     }

@@ -22,7 +22,7 @@ class Log:
     qpos: Float[np.ndarray, "T N 19"]
     """MuJoCo's positions: base position [m], base quaternion (w, x, y, z), joint angles [rad]."""
     qvel: Float[np.ndarray, "T N 18"]
-    """Base velocity, world frame [m/s]; base angular velocity, body frame [rad/s]; joints [rad/s]."""
+    """Base velocity, world frame [m/s]; its angular velocity, body frame, and joints [rad/s]."""
     torque: Float[np.ndarray, "T N 12"]
     """Joint torques [N·m]."""
     contact: Bool[np.ndarray, "T N 4"]
@@ -32,7 +32,7 @@ class Log:
     clearance: Float[np.ndarray, "T N 4"]
     """Height of that point above the ground under it [m]."""
     foot_height: Float[np.ndarray, "T N 4"]
-    """The shift condition's h_i: height of each foot at its last touch, in the condition's frame [m]."""
+    """The condition's h_i: height of each foot at its last touch, in the condition's frame [m]."""
     k: Float[np.ndarray, "T N"]
     """The shift condition's counter, before a firing sets it back to 0."""
     threshold: Float[np.ndarray, "T N"]

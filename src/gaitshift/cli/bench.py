@@ -46,7 +46,10 @@ class Bench:
         if self.json:
             emit_json(figures)
             return
-        rows = [(name, f"{value:,.2f}" if value < 10 else f"{value:,.0f}") for name, value in figures.items()]
+        rows = [
+            (name, f"{value:,.2f}" if value < 10 else f"{value:,.0f}")
+            for name, value in figures.items()
+        ]
         emit_table(f"bench: {self.robots} robots on {self.terrain}", rows)
 
     def _measure(self, report: Report) -> dict[str, float]:

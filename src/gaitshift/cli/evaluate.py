@@ -43,9 +43,9 @@ class Evaluate(EvaluationConfig):
         if self.log is not None and self.log.exists() and not self.overwrite:
             raise GaitshiftError(f"{self.log} exists; give another --log, or --overwrite")
         loaded = policies.load(self.policy)
-        config = EvaluationConfig(**{
-            name: getattr(self, name) for name in EvaluationConfig.__dataclass_fields__
-        })
+        config = EvaluationConfig(
+            **{name: getattr(self, name) for name in EvaluationConfig.__dataclass_fields__}
+        )
         with progress(f"{loaded.gait} on {self.terrain}") as report:
             figures, log = evaluate(loaded, config, report)
         if self.log is not None:
@@ -53,7 +53,9 @@ class Evaluate(EvaluationConfig):
             log.save(self.log)
             say(f"log written to {self.log}")
         if self.json:
-            emit_json({"policy": str(loaded.path), "gait": loaded.gait, **asdict(config), **figures})
+            emit_json(
+                {"policy": str(loaded.path), "gait": loaded.gait, **asdict(config), **figures}
+            )
             return
         rows = [(name, _text(value, UNITS.get(name, ""))) for name, value in figures.items()]
         title = f"{loaded.gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"

@@ -139,9 +139,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._heading: Float[np.ndarray, " N"] = np.zeros(n)
         self._command = Command.straight(n, self.config.forward_speed)
 
-    def _next_observation(
-        self, done: Bool[np.ndarray, " N"], info: dict[str, Any]
-    ) -> Observations:
+    def _next_observation(self, done: Bool[np.ndarray, " N"], info: dict[str, Any]) -> Observations:
         self._update_command()
         observation = self._observation()
         ids = np.flatnonzero(done)

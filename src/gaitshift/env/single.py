@@ -4,10 +4,10 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 from gaitshift.env.config import EnvConfig
-from gaitshift.env.gait_env import GaitEnv, Observations
+from gaitshift.env.gait_env import GaitEnv
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B, Robot
 from gaitshift.terrain import Terrain
@@ -32,7 +32,7 @@ class SingleGaitEnv(gym.Env[np.ndarray, np.ndarray]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Observations, dict[str, Any]]:
+    ) -> tuple[Float32[np.ndarray, " D"], dict[str, Any]]:
         """Starts an episode."""
         super().reset(seed=seed)
         observation, info = self.vector.reset(seed=seed, options=options)
@@ -40,7 +40,7 @@ class SingleGaitEnv(gym.Env[np.ndarray, np.ndarray]):
 
     def step(
         self, action: Float[np.ndarray, " 12"]
-    ) -> tuple[Observations, float, bool, bool, dict[str, Any]]:
+    ) -> tuple[Float32[np.ndarray, " D"], float, bool, bool, dict[str, Any]]:
         """One control step of 10 ms."""
         observation, reward, terminated, truncated, info = self.vector.step(action[None])
         ended = bool(terminated[0] or truncated[0])

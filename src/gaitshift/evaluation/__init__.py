@@ -1,9 +1,9 @@
 """Runs trained robots many at a time: rollouts, evaluations, the demonstration."""
 
+from gaitshift.evaluation.demo import DemoConfig as DemoConfig
+from gaitshift.evaluation.demo import run_demo as run_demo
+from gaitshift.evaluation.demo import summarise as summarise
 from gaitshift.evaluation.evaluate import EvaluationConfig as EvaluationConfig
 from gaitshift.evaluation.evaluate import evaluate as evaluate
 from gaitshift.evaluation.rollout import RolloutConfig as RolloutConfig
 from gaitshift.evaluation.rollout import rollout as rollout
-from gaitshift.evaluation.demo import DemoConfig as DemoConfig
-from gaitshift.evaluation.demo import run_demo as run_demo
-from gaitshift.evaluation.demo import summarise as summarise

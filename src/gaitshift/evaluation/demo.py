@@ -108,8 +108,10 @@ def run_demo(
 
 
 def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
-    """What one robot did until it crossed `finish` [m] or the run ended: survival, distance,
-    mean speed and every shift of gait."""
+    """What one robot did until it crossed `finish` [m] or the run ended.
+
+    Survival, distance, mean speed, and every shift of gait.
+    """
     x = log.qpos[:, robot, 0]
     crossed = np.flatnonzero(x >= finish)
     end = int(crossed[0]) + 1 if crossed.size else len(x)

@@ -78,9 +78,7 @@ def rollout(
     return recorder.log()
 
 
-def _command(
-    config: RolloutConfig, motion: Motion, start_xy: Float[np.ndarray, "N 2"]
-) -> Command:
+def _command(config: RolloutConfig, motion: Motion, start_xy: Float[np.ndarray, "N 2"]) -> Command:
     lateral = motion.base_position_w[:, 1] - start_xy[:, 1]
     yaw_rate = config.heading_loop.yaw_rate(motion.yaw, np.zeros(len(lateral)), lateral)
     return Command(forward_speed=np.full(len(lateral), config.speed), yaw_rate=yaw_rate)

@@ -1,7 +1,7 @@
 """The contact diagram: which feet stood when, after Hildebrand."""
 
 # matplotlib's own stubs leave **kwargs untyped:
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from gaitshift.log import Log
 from gaitshift.plots.palette import INK, QUIET, gait_colours
 from gaitshift.plots.rows import draw_contacts
-from gaitshift.plots.signals import check_robot, edges, runs, shifts, window
+from gaitshift.plots.signals import check_robot, gait_spans, period, shift_times, window
 from gaitshift.plots.style import check_target, house_style, save
 
 _SIZE = (7.5, 2.9)
@@ -38,11 +38,10 @@ def contact_diagram(
         axes = figure.add_axes((0.07, 0.22, 0.83, 0.60))
         draw_contacts(axes, part, robot)
         axes.set_ylabel("")
-        ends = edges(part.time)
-        axes.set_xlim(ends[0], ends[-1])
+        axes.set_xlim(float(part.time[0]), float(part.time[-1]) + period(part))
         axes.set_xlabel("time [s]")
-        for entry in shifts(part, robot):
-            axes.axvline(float(part.time[entry]), color=INK, linewidth=1.2, gid="shift")
+        for time in shift_times(part, robot):
+            axes.axvline(time, color=INK, linewidth=1.2, gid="shift")
         _write_gaits(axes, part, robot)
         _write_shares(axes, part, robot)
         save(figure, path)
@@ -52,12 +51,17 @@ def contact_diagram(
 def _write_gaits(axes: Axes, log: Log, robot: int) -> None:
     """The names of the gaits above the bars, each where it is in force."""
     colours = gait_colours(log.gaits)
-    ends, gait = edges(log.time), log.gait[:, robot]
-    for start, stop in runs(gait):
-        name = log.gaits[gait[start]]
-        middle = (ends[start] + ends[stop]) / 2
-        place = {"ha": "center", "va": "bottom", "size": 14, "weight": "bold"}
-        axes.text(middle, -0.65, name, color=colours[name], **place)
+    for name, span in gait_spans(log, robot):
+        axes.text(
+            span.middle,
+            -0.65,
+            name,
+            color=colours[name],
+            ha="center",
+            va="bottom",
+            size=14,
+            weight="bold",
+        )
 
 
 def _write_shares(axes: Axes, log: Log, robot: int) -> None:

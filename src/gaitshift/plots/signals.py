@@ -1,16 +1,32 @@
-"""What figures and videos derive from a log: spans, speeds, the ground, smooth courses."""
+"""What figures and videos derive from a log: spans of time, speeds, the ground, smooth courses."""
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.log import Log
-from gaitshift.terrain import Terrain
 
 _TIMELESS = ("gaits", "robot", "terrain")
 """What the names of a log's fields begin with where the first axis is not time."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Span:
+    """A stretch of time in which something stays as it is."""
+
+    begin: float
+    """[s]"""
+    end: float
+    """[s]"""
+    entry: int
+    """The log's entry that it begins with."""
+
+    @property
+    def middle(self) -> float:
+        """Half-way between them [s]."""
+        return (self.begin + self.end) / 2
 
 
 def check_robot(log: Log, robot: int) -> None:
@@ -34,32 +50,45 @@ def window(log: Log, t0: float, t1: float) -> Log:
     return replace(log, **{name: getattr(log, name)[inside] for name in courses})
 
 
-def edges(time: Float[np.ndarray, " T"]) -> Float[np.ndarray, " T+1"]:
-    """Ends of the stretches that entries stand for [s]: from each entry to the one after it."""
-    return np.append(time, 2 * time[-1] - time[-2])
+def period(log: Log) -> float:
+    """Time from one entry to the next [s]."""
+    return float(log.time[1] - log.time[0])
 
 
-def runs(values: Shaped[np.ndarray, " T"]) -> Int[np.ndarray, "n 2"]:
-    """Stretches of equal values: first entry and the one after the last, in order."""
+def spans(log: Log, values: Shaped[np.ndarray, " T"]) -> list[Span]:
+    """Stretches of equal values. An entry stands for the time until the next one."""
     cuts = np.flatnonzero(values[1:] != values[:-1]) + 1
-    return np.stack([np.append(0, cuts), np.append(cuts, len(values))], axis=1)
+    entries = [0, *cuts.tolist()]
+    times = [*log.time[entries].tolist(), float(log.time[-1]) + period(log)]
+    return [Span(begin=times[i], end=times[i + 1], entry=entry) for i, entry in enumerate(entries)]
 
 
-def runs_of(flags: Shaped[np.ndarray, " T"]) -> Int[np.ndarray, "n 2"]:
-    """Those of the `runs` in which the flag is set, as the stance phases of a foot."""
-    stretches = runs(flags)
-    return stretches[np.asarray(flags[stretches[:, 0]], dtype=bool)]
+def gait_at(log: Log, robot: int, entry: int) -> str:
+    """Name of the gait in force."""
+    return log.gaits[int(log.gait[entry, robot])]
 
 
-def shifts(log: Log, robot: int) -> Int[np.ndarray, " n"]:
-    """Entries at which another gait takes over, as long as the robot stands."""
-    return runs(log.gait[: fall(log, robot), robot])[1:, 0]
+def gait_spans(log: Log, robot: int) -> list[tuple[str, Span]]:
+    """The gaits one after the other, and when each was in force."""
+    return [(gait_at(log, robot, s.entry), s) for s in spans(log, log.gait[:, robot])]
 
 
-def fall(log: Log, robot: int) -> int | None:
-    """First entry at which the robot has fallen, if it has."""
+def shift_times(log: Log, robot: int) -> list[float]:
+    """When another gait takes over [s], as long as the robot stands."""
+    fell = fall_time(log, robot)
+    starts = [span.begin for _, span in gait_spans(log, robot)[1:]]
+    return [time for time in starts if fell is None or time < fell]
+
+
+def fall_time(log: Log, robot: int) -> float | None:
+    """When the robot fell [s], if it did."""
     fallen = np.flatnonzero(log.fallen[:, robot])
-    return int(fallen[0]) if fallen.size else None
+    return float(log.time[fallen[0]]) if fallen.size else None
+
+
+def has_condition(log: Log, robot: int) -> bool:
+    """Whether a shift condition was at work: logs hold zeros where none was."""
+    return bool((log.threshold[:, robot] > 0).any())
 
 
 def forward_speed(log: Log, robot: int) -> Float[np.ndarray, " T"]:
@@ -69,26 +98,22 @@ def forward_speed(log: Log, robot: int) -> Float[np.ndarray, " T"]:
     return np.einsum("ti,ti->t", forward, log.qvel[:, robot, :3])
 
 
-def smoothed(
-    values: Float[np.ndarray, " T"], time: Float[np.ndarray, " T"], sigma: float
-) -> Float[np.ndarray, " T"]:
-    """The values, averaged with a Gaussian window of standard deviation `sigma` [s].
+def ground_below(log: Log, robot: int) -> Float[np.ndarray, " T"]:
+    """Height of the ground below the robot's feet, the mean of the four [m].
+
+    It needs no terrain, so it is right for every robot of a log, each on its own ground.
+    """
+    height = log.foot_position_w[:, robot, :, 2] - log.clearance[:, robot]
+    return height.mean(axis=1)
+
+
+def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:
+    """Values every `step` [s], averaged in a Gaussian window of standard deviation `sigma` [s].
 
     The window looks both ways, so nothing is delayed; beyond its ends a course goes on as its
     mirror image through the end point, so that a straight line stays one.
     """
-    period = time[-1] - time[-2]
-    reach = int(np.ceil(3 * sigma / period))
-    window = np.exp(-0.5 * (np.arange(-reach, reach + 1) * period / sigma) ** 2)
+    reach = int(np.ceil(3 * sigma / step))
+    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / sigma) ** 2)
     padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
-    return np.convolve(padded, window / window.sum(), mode="valid")
-
-
-def ground_of(log: Log) -> Terrain:
-    """The terrain that the log was made on."""
-    return Terrain(
-        height=log.terrain_height,
-        size=(float(log.terrain_size[0]), float(log.terrain_size[1])),
-        origin=(float(log.terrain_origin[0]), float(log.terrain_origin[1])),
-        name=log.terrain,
-    )
+    return np.convolve(padded, weights / weights.sum(), mode="valid")

@@ -3,10 +3,11 @@
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
+from typing import Any, cast
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
@@ -22,7 +23,10 @@ FORMATS = (".png", ".svg", ".pdf")
 DPI = 160
 """Pixels an inch: a figure 10 inches wide has 1600 pixels."""
 
-_STYLE = {
+DASHES = (0, (4, 2))
+"""Line style of what is asked for, beside what is done."""
+
+_STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same words on every machine
     "font.size": 13,
     "text.color": INK,
@@ -54,9 +58,9 @@ _STYLE = {
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
+def house_style() -> Generator[None]:
     """Everything drawn inside looks alike, whatever the user's own settings are."""
-    with rc_context(_STYLE):
+    with rc_context(cast(Any, _STYLE)):
         yield
 
 
@@ -69,7 +73,7 @@ def check_target(path: Path) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes the figure, the same bytes for the same figure; a PNG with 256 colours, to be small."""
+    """Writes the figure, the same bytes for the same figure; a PNG in 256 colours, to be small."""
     ending = path.suffix.lower()
     if ending != ".png":
         figure.savefig(

@@ -1,7 +1,7 @@
 """The course of a training, from its `progress.csv`."""
 
 # matplotlib's own stubs leave **kwargs untyped:
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+# pyright: reportUnknownMemberType=false
 
 import csv
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.plots.palette import INK, PALE, QUIET
-from gaitshift.plots.signals import runs
 from gaitshift.plots.style import check_target, house_style, name_row, save
 
 _ROWS = (
@@ -109,14 +109,15 @@ def _mark_stages(
     page: Sequence[Axes], steps: Float[np.ndarray, " n"], stages: Sequence[str]
 ) -> None:
     """A grey band behind every other stage, and the names above."""
-    ends = np.append(0.0, steps)
-    for n, (start, stop) in enumerate(runs(np.array(stages))):
-        left, right = ends[start], ends[stop]
+    starts = [i for i, stage in enumerate(stages) if i == 0 or stage != stages[i - 1]]
+    ends = [0.0, *(float(steps[i - 1]) for i in starts[1:]), float(steps[-1])]
+    for n, start in enumerate(starts):
+        left, right = ends[n], ends[n + 1]
         for axes in page:
             if n % 2 == 1:
                 axes.axvspan(left, right, color=PALE, alpha=0.5, linewidth=0, zorder=0)
         page[0].annotate(
-            str(stages[start]),
+            stages[start],
             ((left + right) / 2, 1.0),
             (0, 24),
             color=QUIET,
@@ -130,13 +131,15 @@ def _add_wall_time(
     axes: Axes, steps: Float[np.ndarray, " n"], wall: Float[np.ndarray, " n"]
 ) -> None:
     """A second scale below the first: the minutes that the training took so far."""
-    scale = axes.secondary_xaxis(
-        -0.42,
-        functions=(
-            lambda x: np.interp(x, np.append(0.0, steps), np.append(0.0, wall)),
-            lambda x: np.interp(x, np.append(0.0, wall), np.append(0.0, steps)),
-        ),
-    )
-    ticks = MaxNLocator(6).tick_values(0.0, wall[-1])
-    scale.set_xticks(ticks[ticks <= wall[-1]])
+    there, back = np.append(0.0, steps), np.append(0.0, wall)
+
+    def minutes(x: ArrayLike) -> ArrayLike:
+        return np.interp(np.asarray(x, dtype=float), there, back)
+
+    def millions(x: ArrayLike) -> ArrayLike:
+        return np.interp(np.asarray(x, dtype=float), back, there)
+
+    scale = axes.secondary_xaxis(-0.42, functions=(minutes, millions))
+    ticks = [float(tick) for tick in MaxNLocator(6).tick_values(0.0, wall[-1])]
+    scale.set_xticks([tick for tick in ticks if tick <= wall[-1]])
     scale.set_xlabel("wall time [min]")

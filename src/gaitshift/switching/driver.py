@@ -95,7 +95,9 @@ class Driver:
 
     def _check(self, start: str) -> None:
         if start not in self.policies:
-            raise GaitshiftError(f"no policy for the gait '{start}'; known: {', '.join(self.gaits)}")
+            raise GaitshiftError(
+                f"no policy for the gait '{start}'; known: {', '.join(self.gaits)}"
+            )
         infos = [policy.info for policy in self.policies.values()]
         for name, info in zip(self.gaits, infos, strict=True):
             if (info.robot, info.gains) != (infos[0].robot, infos[0].gains):

@@ -1,7 +1,7 @@
 """Who changes the gaits: the foot-height condition, or a schedule."""
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
@@ -24,6 +24,7 @@ class Decision:
     """h_i: height of each foot at its last touch, in the condition's frame [m]."""
 
 
+@runtime_checkable
 class Switcher(Protocol):
     """Looks at the motion once a control step and changes gaits through the driver."""
 

@@ -67,7 +67,9 @@ def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
         else:
             raise TypeError(f"cannot export a layer of type {type(layer).__name__}")
     nodes[-1].output[0] = "action"
-    observation = helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["N", actor.obs_dim])
+    observation = helper.make_tensor_value_info(
+        "observation", TensorProto.FLOAT, ["N", actor.obs_dim]
+    )
     action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["N", 12])
     graph = helper.make_graph(nodes, "policy", [observation], [action], constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=9)

@@ -11,7 +11,7 @@ from tensordict import TensorDict
 
 from gaitshift.env import GaitEnv
 from gaitshift.observation import JOINT_MIRROR
-from gaitshift.training.recipe import PpoConfig, Recipe
+from gaitshift.training.recipe import Recipe
 
 _GROUPS = {"actor": ["policy"], "critic": ["policy"]}
 """Actor and critic see the same observation (paper IV-A)."""
@@ -98,8 +98,10 @@ class _Statistics:
         self._steps += 1
 
     def means(self) -> dict[str, float]:
-        """Mean of each quantity; `survival` is the chance to last 10 s at the present rate of
-        falls."""
+        """Mean of each quantity.
+
+        `survival` is the chance to last 10 s at the present rate of falls.
+        """
         means = {name: total / self._steps for name, total in self._sums.items()}
         means["survival"] = float((1.0 - means.pop("falls")) ** 1000)
         return means

@@ -68,8 +68,8 @@ class Recipe:
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """The algorithm."""
     stages: tuple[Stage, ...] = (
-        Stage(name="flat", iterations=400),
-        Stage(name="rough", iterations=800, amplitude=0.15, push=120.0),
+        Stage(name="flat", iterations=300),
+        Stage(name="rough", iterations=700, amplitude=0.15, push=120.0),
     )
     """Flat ground, then Perlin ground with pushes (paper III-D)."""
     robots: int = 128

@@ -35,9 +35,7 @@ class Pusher:
         self.config = config
         self._rng = rng
         # Every robot starts somewhere in its pause, so that nobody is pushed at step 0.
-        self._clock: Int[np.ndarray, " N"] = rng.integers(
-            config.duration, config.interval, size=n
-        )
+        self._clock: Int[np.ndarray, " N"] = rng.integers(config.duration, config.interval, size=n)
         self._force_w: Float[np.ndarray, "N 3"] = np.zeros((n, 3))
 
     def step(self) -> Float[np.ndarray, "N 3"]:

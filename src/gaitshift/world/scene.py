@@ -10,8 +10,10 @@ GROUND = "ground"
 
 
 def build_model(robot: Robot, gains: Gains, terrain: Terrain) -> mujoco.MjModel:
-    """The model of one robot on one terrain. Level ground is a plane, which is faster and has no
-    border; everything else a height field."""
+    """The model of one robot on one terrain.
+
+    Level ground is a plane, which is faster and has no border; everything else a height field.
+    """
     spec = robot.spec(gains)
     ground = {"name": GROUND, "contype": 1, "conaffinity": 0, "friction": [0.8, 0.005, 0.0001]}
     if terrain.is_flat:

@@ -88,8 +88,11 @@ class World:
         joint_position: Float[np.ndarray, "K 12"] | None = None,
         base_velocity_w: Float[np.ndarray, "K 3"] | None = None,
     ) -> None:
-        """Sets robots down at rest: base upright at `xy` [m] and `yaw` [rad], lowest foot on
-        the ground, joints in the stance unless given [rad]."""
+        """Sets robots down with the base upright and the lowest foot on the ground.
+
+        Base at `xy` [m] and `yaw` [rad], at rest unless a velocity [m/s] is given; joints in the
+        stance unless given [rad].
+        """
         qpos = np.zeros((len(ids), _POSE + 12))
         qpos[:, :2] = xy
         qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)

@@ -1,0 +1,62 @@
+# The verbs are CI's. Each makes .venv on first use and installs what it needs; after that a call
+# costs nothing until pyproject.toml or constraints.txt changes. Another Python: make PYTHON=...
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PYTEST_ARGS ?=
+
+# Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.
+BASE := $(VENV)/.base-installed
+DEV := $(VENV)/.dev-installed
+STUBS := typings/.made
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.PHONY: help demo test check bench clean
+
+help: ## list what can be made
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(BASE) ## a robot shifts its gait by itself: out/demo (a light install, without torch)
+	@$(BIN)/gaitshift demo --out out/demo --overwrite
+
+test: $(DEV) ## run the tests; PYTEST_ARGS="-k switching" for some of them
+	@$(BIN)/python -m pytest $(PYTEST_ARGS)
+
+check: $(DEV) $(STUBS) ## lint, format, types and floors
+	@$(BIN)/ruff check --quiet
+	@$(BIN)/ruff format --check --quiet
+	@$(BIN)/basedpyright
+	@$(BIN)/lint-imports --no-logo
+
+bench: $(DEV) ## speed of the environment and of training on this machine
+	@$(BIN)/gaitshift bench
+
+clean: ## remove what make made, but for .venv and runs/
+	@rm -rf out build dist typings .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	@find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo 'gaitshift needs Python 3.11 or newer: make PYTHON=python3.12, for example' >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(BASE): pyproject.toml | $(BIN)/python
+	@echo 'installing gaitshift into $(VENV) (once)'
+	@$(PIP) install --editable .
+	@touch $@
+
+$(DEV): pyproject.toml constraints.txt | $(BIN)/python
+	@echo 'installing gaitshift with training and tools into $(VENV) (once, some minutes)'
+	@$(PIP) install --constraint constraints.txt torch
+	@$(PIP) install --constraint constraints.txt --editable '.[train,dev]'
+	@touch $(BASE) $@
+
+$(STUBS): $(DEV)
+	@echo 'making type stubs of MuJoCo'
+	@rm -rf typings/mujoco
+	@$(BIN)/pybind11-stubgen mujoco --output-dir typings --ignore-all-errors 2>/dev/null
+	@touch $@
