@@ -4,8 +4,10 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?=
+GAITS ?= trot pace bound
+SEED ?= 0
 
 # Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.
 BASE := $(VENV)/.base-installed
@@ -15,10 +17,10 @@ STUBS := typings/.made
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test check bench clean
+.PHONY: help demo test check bench policies clean
 
 help: ## list what can be made
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-6s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(BASE) ## a robot shifts its gait by itself: out/demo (a light install, without torch)
 	@$(BIN)/gaitshift demo --out out/demo --overwrite
@@ -34,6 +36,12 @@ check: $(DEV) $(STUBS) ## lint, format, types and floors
 
 bench: $(DEV) ## speed of the environment and of training on this machine
 	@$(BIN)/gaitshift bench
+
+policies: $(DEV) ## train the shipped gaits anew, one after another, and put them into the package
+	@for gait in $(GAITS); do \
+	    $(BIN)/gaitshift train $$gait --seed $(SEED) --out runs/$$gait-$(SEED) --overwrite || exit 1; \
+	done
+	@$(BIN)/python tools/ship_policy.py $(GAITS:%=runs/%-$(SEED))
 
 clean: ## remove what make made, but for .venv and runs/
 	@rm -rf out build dist typings .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -28,6 +28,7 @@ def measure(
     - `touchdowns_per_cycle` (4,): raw contact onsets of each foot over full cycles.
     - `duty_factor` (4,): share of steps each foot is down.
     - `slip` [m/s]: mean horizontal speed of the feet in contact.
+    - `overspeed`: share of steps in which a joint is faster than the robot's limit.
     - `cost_of_transport`: mean mechanical power Σ|τ q̇| over m·g·v.
     - `heading_error_sd` [rad]: spread of the heading about the line x.
     - `lateral_error_p95` [m]: 95th percentile of the distance from the line, at the end.
@@ -62,6 +63,7 @@ def measure(
         "touchdowns_per_cycle": [float(x) for x in onsets.sum(axis=(0, 1)) / count],
         "duty_factor": [float(x) for x in feet.sum(axis=(0, 1)) / steps],
         "slip": _slip(log, late, feet),
+        "overspeed": float((_too_fast(log)[late] & alive).sum() / steps),
         "cost_of_transport": float(
             power[alive].mean() / (mass * GRAVITY * max(abs(mean_speed), 1e-3))
         )
@@ -110,6 +112,11 @@ def _cycles(log: Log, machines: Mapping[str, RewardMachine]) -> Bool[np.ndarray,
     same_gait = log.gait[1:] == log.gait[:-1]
     entry[1:] = in_first[1:] & ~in_first[:-1] & same_gait
     return entry
+
+
+def _too_fast(log: Log) -> Bool[np.ndarray, "T N"]:
+    """Where the fastest joint exceeds the robot's velocity limit."""
+    return np.abs(log.qvel[..., 6:]).max(axis=-1) > ROBOTS[log.robot].velocity_limit
 
 
 def _slip(log: Log, late: Bool[np.ndarray, " T"], feet: Bool[np.ndarray, "L N 4"]) -> float:

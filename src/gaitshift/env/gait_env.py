@@ -25,7 +25,7 @@ Observations = Float32[np.ndarray, "N D"]
 class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
 
-    An episode ends when the body touches the ground, and is cut after `episode_steps` or at the
+    An episode ends when the body touches the ground or the machine accepts, and is cut after `episode_steps` or at the
     border of the terrain. Robots restart in the same step (`AutoresetMode.SAME_STEP`); the
     observation that ended an episode is in `info["final_obs"]`, where `info["_final_obs"]` holds.
     `info["reward_terms"]` has each weighted term of the reward, `info["changed"]` says where the
@@ -108,7 +108,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             "shows_stance": shows_stance,
             "forward_speed": motion.base_linear_velocity_b[:, 0],
         }
-        terminated = motion.body_contact
+        terminated = motion.body_contact | np.isin(self._state, self.machine.accepting)
         truncated = (self._age >= self.config.episode_steps) | self._left_terrain(motion)
         truncated &= ~terminated
         observation = self._next_observation(terminated | truncated, info)

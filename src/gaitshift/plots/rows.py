@@ -5,7 +5,6 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.ticker import MaxNLocator
 
 from gaitshift.legs import LEGS
 from gaitshift.log import Log
@@ -19,7 +18,7 @@ from gaitshift.plots.signals import (
     smoothed,
     spans,
 )
-from gaitshift.plots.style import DASHES, name_row
+from gaitshift.plots.style import DASHES, few_ticks, name_row
 
 _SPEED_SIGMA = 0.2
 """Of the window over the speed [s]: half a stride, so that the course is seen and not the steps."""
@@ -80,7 +79,7 @@ def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
         handletextpad=0.4,
         columnspacing=1.2,
     )
-    axes.yaxis.set_major_locator(MaxNLocator(4))
+    few_ticks(axes)
     name_row(axes, "foot height at last touch, $h_i$ [cm]")
 
 
@@ -95,7 +94,7 @@ def draw_counter(axes: Axes, log: Log, robot: int) -> None:
         if span.end - span.begin >= _ROOM * np.ptp(log.time):
             axes.text(span.middle, value, f"β = {value:g}", color=QUIET, ha="center", va="bottom")
     axes.set_ylim(0, 1.3 * max(float(k.max()), float(threshold.max())))
-    axes.yaxis.set_major_locator(MaxNLocator(4, integer=True))
+    few_ticks(axes)
     axes.grid(visible=False)
     name_row(axes, "counter k, threshold β [counts]")
 
@@ -112,7 +111,7 @@ def draw_speed(axes: Axes, log: Log, robot: int) -> None:
     low = min(0.0, float(course.min()))
     high = max(float(course.max()), float(command.max()), low + 0.1)
     axes.set_ylim(low, low + 1.25 * (high - low))
-    axes.yaxis.set_major_locator(MaxNLocator(4))
+    few_ticks(axes)
     name_row(axes, "forward speed, dashed: command [m/s]")
 
 
@@ -124,5 +123,5 @@ def draw_ground(axes: Axes, log: Log, robot: int) -> None:
     axes.plot(log.time, ground, color=INK, linewidth=1.0, label="ground")
     axes.plot(log.time, base, color=INK, label="base")
     axes.set_ylim(bottom, max(float(base.max()), float(ground.max())) + 0.08)
-    axes.yaxis.set_major_locator(MaxNLocator(4))
-    name_row(axes, "height of the base, and of the ground below the feet [m]")
+    few_ticks(axes)
+    name_row(axes, "base and ground, height [m]")

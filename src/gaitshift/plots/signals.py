@@ -7,9 +7,13 @@ from jaxtyping import Float, Shaped
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.log import Log
+from gaitshift.terrain import Terrain
 
 _TIMELESS = ("gaits", "robot", "terrain")
 """What the names of a log's fields begin with where the first axis is not time."""
+
+_SAME_GROUND = 0.01
+"""Grounds that differ by no more below all feet are the same [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,13 +102,31 @@ def forward_speed(log: Log, robot: int) -> Float[np.ndarray, " T"]:
     return np.einsum("ti,ti->t", forward, log.qvel[:, robot, :3])
 
 
-def ground_below(log: Log, robot: int) -> Float[np.ndarray, " T"]:
-    """Height of the ground below the robot's feet, the mean of the four [m].
+def ground_of(log: Log) -> Terrain:
+    """The ground that the log keeps."""
+    return Terrain(
+        height=log.terrain_height,
+        size=(float(log.terrain_size[0]), float(log.terrain_size[1])),
+        origin=(float(log.terrain_origin[0]), float(log.terrain_origin[1])),
+        name=log.terrain,
+    )
 
-    It needs no terrain, so it is right for every robot of a log, each on its own ground.
-    """
-    height = log.foot_position_w[:, robot, :, 2] - log.clearance[:, robot]
-    return height.mean(axis=1)
+
+def walks_on_kept_ground(log: Log, robot: int) -> bool:
+    """Whether the ground that the log keeps is this robot's: of several it keeps the first."""
+    kept = ground_of(log).height_at(log.foot_position_w[:, robot, :, :2])
+    return bool(np.allclose(kept, _ground_below_feet(log, robot), atol=_SAME_GROUND))
+
+
+def ground_below(log: Log, robot: int) -> Float[np.ndarray, " T"]:
+    """Height of the ground below the base [m]; if the log does not keep it, below the feet."""
+    if walks_on_kept_ground(log, robot):
+        return ground_of(log).height_at(log.qpos[:, robot, :2])
+    return _ground_below_feet(log, robot).mean(axis=1)
+
+
+def _ground_below_feet(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
+    return log.foot_position_w[:, robot, :, 2] - log.clearance[:, robot]
 
 
 def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:

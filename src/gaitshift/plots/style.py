@@ -12,6 +12,7 @@ from typing import Any, cast
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from gaitshift.errors import GaitshiftError
@@ -91,3 +92,8 @@ def name_row(axes: Axes, label: str) -> None:
     """Labels the y axis in upright words at its upper end, where a telephone shows them too."""
     axes.set_ylabel(label, rotation=0, ha="left", va="bottom")
     axes.yaxis.set_label_coords(0.0, 1.04)
+
+
+def few_ticks(axes: Axes) -> None:
+    """Few numbers on the y axis, and round ones."""
+    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.plots.palette import INK, PALE, QUIET
-from gaitshift.plots.style import check_target, house_style, name_row, save
+from gaitshift.plots.style import check_target, few_ticks, house_style, name_row, save
 
 _ROWS = (
     ("reward", 1.0, "reward [per control step]"),
@@ -93,7 +93,7 @@ def _draw_course(
 ) -> None:
     axes.plot(steps, values, color=QUIET, alpha=0.4, linewidth=0.8, label="each iteration")
     axes.plot(steps, _averaged(values), color=INK, label="average")
-    axes.yaxis.set_major_locator(MaxNLocator(4))
+    few_ticks(axes)
 
 
 def _averaged(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

@@ -1,0 +1,577 @@
+"""The product S × U: Gymnasium's contract, one step told twice, and what ends an episode."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import mujoco
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+from gaitshift import gaits
+from gaitshift.env import EnvConfig, GaitEnv
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.robot import ANYMAL_B
+from gaitshift.terrain import flat, perlin
+from gaitshift.world import PushConfig
+
+FLAT = flat(20.0, 20.0)
+STANCE = ANYMAL_B.stance_angles
+DWELL, SWING_HEIGHT = 3, 0.004
+EDGES = {0: ({1}, {0}, 1, 1.0), 1: ({0}, {1}, 0, 0.5)}
+"""By state: feet that must be down, feet that must be up, next state, multiplier of b."""
+HOP = RewardMachine.from_dict(
+    {
+        "name": "hop",
+        "title": "Hop",
+        "description": "The front feet take turns: something happens under arbitrary actions too.",
+        "dwell": DWELL,
+        "swing_height": SWING_HEIGHT,
+        "ideal_phase": {"FL": 0.0, "FR": 0.5, "BL": 0.5, "BR": 0.0},
+        "state": [
+            {"name": "FL", "stance": ["FL", "BL", "BR"]},
+            {"name": "FR", "stance": ["FR", "BL", "BR"]},
+        ],
+        "transition": [
+            {"from": "FL", "to": "FR", "down": ["FR"], "up": ["FL"]},
+            {"from": "FR", "to": "FL", "down": ["FL"], "up": ["FR"], "bonus": 0.5},
+        ],
+    }
+)
+FOLD = np.array([[0.0, 4.0, -6.0] * 2 + [0.0, -4.0, 6.0] * 2])
+"""An action that folds all legs, so that the body comes to the ground."""
+
+
+def hop(n=3, *, ground=FLAT, threads=1, **config):
+    return GaitEnv(HOP, ground, n, config=EnvConfig(**config), threads=threads)
+
+
+def arbitrary_actions(seed, steps, n, size=1.0):
+    """Actions (T, N, 12) that stagger about."""
+    rng, action, actions = np.random.default_rng(seed), np.zeros((n, 12)), []
+    for _ in range(steps):
+        action = 0.8 * action + size * rng.normal(size=(n, 12))
+        actions.append(action)
+    return np.array(actions)
+
+
+def run(env, actions, seed=5):
+    """Everything that reset and the steps return."""
+    return [env.reset(seed=seed), *(env.step(action) for action in actions)]
+
+
+def keep_motions(env, monkeypatch):
+    """Motions after each physics step, before any robot starts anew."""
+    motions, step = [], env.world.step
+
+    def kept(target):
+        motions.append(step(target))
+        return motions[-1]
+
+    monkeypatch.setattr(env.world, "step", kept)
+    return motions
+
+
+# Gymnasium's contract ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gait", gaits.names())
+# Advice that Gymnasium does not demand: observations here are measurements without a largest value.
+@pytest.mark.filterwarnings("ignore:.*A Box observation space (min|max)imum value is")
+@pytest.mark.filterwarnings("ignore:.*we recommend using a symmetric and normalized space")
+def test_gymnasiums_checker_finds_nothing_to_complain_about(gait):
+    check_env(gym.make(f"gaitshift/{gait}-v0").unwrapped)
+
+
+@pytest.mark.parametrize("gait", gaits.names())
+def test_make_vec_knows_every_shipped_gait(gait):
+    env = gym.make_vec(f"gaitshift/{gait}-v0", num_envs=3)
+    assert isinstance(env, GaitEnv)
+    assert env.machine.name == gait
+    assert env.num_envs == 3
+    assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+def test_registered_environments_take_terrain_and_config():
+    config = EnvConfig(observed=("contact",), episode_steps=7)
+    keywords = {"terrain": "perlin:0.1", "terrain_seed": 3, "config": config}
+    many = gym.make_vec("gaitshift/trot-v0", num_envs=2, **keywords)
+    one = gym.make("gaitshift/trot-v0", **keywords)
+    assert many.observation_space.shape == (2, 4)
+    assert one.observation_space.shape == (4,)
+    assert many.world.terrains[0].height.max() > 0
+    ground = one.unwrapped.vector.world.terrains[0]
+    np.testing.assert_array_equal(many.world.terrains[0].height, ground.height)
+
+
+def test_observations_and_actions_lie_in_their_spaces():
+    env = hop(3)
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+    assert env.single_observation_space.contains(observation[0])
+    assert env.action_space.shape == (3, 12)
+    env.action_space.seed(0)
+    for _ in range(5):
+        observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+        assert env.observation_space.contains(observation)
+        assert reward.shape == terminated.shape == truncated.shape == (3,)
+        assert np.isfinite(reward).all()
+        assert terminated.dtype == truncated.dtype == bool
+
+
+def test_gymnasiums_own_episode_counter_counts_the_same_episodes():
+    env = RecordEpisodeStatistics(hop(2, episode_steps=6))
+    env.reset(seed=0)
+    lengths, rewards, total = [], [], np.zeros(2)
+    for _ in range(18):
+        _, reward, _, truncated, info = env.step(np.zeros((2, 12)))
+        total += reward
+        if truncated.any():
+            assert truncated.all()
+            lengths.append(info["episode"]["l"].tolist())
+            rewards.append((info["episode"]["r"], total))
+            total = np.zeros(2)
+    assert lengths == [[6, 6]] * 3
+    for counted, summed in rewards:
+        np.testing.assert_allclose(counted, summed, rtol=1e-5)
+
+
+def test_one_robot_as_a_plain_environment_goes_the_way_of_a_vector_of_one():
+    one = gym.make("gaitshift/trot-v0").unwrapped
+    many = gym.make_vec("gaitshift/trot-v0", num_envs=1)
+    np.testing.assert_array_equal(one.reset(seed=4)[0], many.reset(seed=4)[0][0])
+    for action in arbitrary_actions(1, 30, 1):
+        seen, reward, *ended, info = one.step(action[0])
+        all_seen, rewards, terminated, truncated, infos = many.step(action)
+        np.testing.assert_array_equal(seen, all_seen[0])
+        assert (reward, *ended) == (rewards[0], terminated[0], truncated[0])
+        assert info["changed"] == infos["changed"][0]
+
+
+def test_one_robot_as_a_plain_environment_is_shown_its_fall():
+    env = gym.make("gaitshift/trot-v0").unwrapped
+    env.reset(seed=0)
+    for _ in range(200):
+        seen, _, terminated, _, _ = env.step(FOLD[0])
+        if terminated:
+            break
+    assert terminated
+    height = seen[env.vector.observe.slices["base_height"]].item()
+    assert height < 0.3, "of a robot on its belly, not of one that has just begun anew"
+
+
+def test_an_episode_needs_a_step_and_a_speed_that_legs_can_run():
+    with pytest.raises(GaitshiftError, match="episode of 0 steps: at least 1"):
+        EnvConfig(episode_steps=0)
+    with pytest.raises(GaitshiftError, match=r"speed -0\.1 m/s: 0 to 3"):
+        EnvConfig(forward_speed=-0.1)
+
+
+# Chance -----------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bits():
+    config = {"push": PushConfig(force=200.0, duration=5, interval=12), "heading_interval": 9}
+    actions = arbitrary_actions(2, 50, 3)
+    ways = [run(hop(3, episode_steps=20, **config), actions) for _ in range(2)]
+    for one, other in zip(*ways, strict=True):
+        for part, twin in zip(one[:-1], other[:-1], strict=True):
+            np.testing.assert_array_equal(part, twin)
+
+
+def test_a_seed_begins_anew_whatever_came_before():
+    env, actions = hop(3, episode_steps=20), arbitrary_actions(2, 30, 3)
+    first = run(env, actions)
+    again = run(env, actions)
+    np.testing.assert_array_equal(first[-1][0], again[-1][0])
+
+
+def test_the_number_of_threads_changes_no_bit():
+    actions = arbitrary_actions(2, 40, 5)
+    one, two = (run(hop(5, episode_steps=15, threads=threads), actions) for threads in (1, 2))
+    np.testing.assert_array_equal(one[-1][0], two[-1][0])
+
+
+def test_other_seeds_and_resets_without_a_seed_give_other_starts():
+    env = hop(3)
+    starts = [env.reset(seed=0)[0], env.reset(seed=1)[0], env.reset()[0], env.reset()[0]]
+    for index, start in enumerate(starts):
+        assert all(not np.array_equal(start, other) for other in starts[:index])
+        assert len(np.unique(start, axis=0)) == 3, "robots start differently"
+
+
+# One step, told a second time -------------------------------------------------------------------
+
+
+def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(monkeypatch):
+    env = hop(3, episode_steps=70, heading_range=0.0)
+    env.reset(seed=1)
+    motions = keep_motions(env, monkeypatch)
+    states, deltas, changes, falls = [0] * 3, [0] * 3, 0, 0
+    one_hot, delta_slice = env.observe.slices["machine_state"], env.observe.slices["steps_in_state"]
+
+    def check(observation, robot):
+        shown = observation[robot, one_hot].tolist()
+        assert shown == [float(u == states[robot]) for u in range(2)]
+        delta = observation[robot, delta_slice].item()
+        assert delta == pytest.approx(min(deltas[robot] / 20, 5))
+
+    for action in arbitrary_actions(7, 300, 3, size=1.5):
+        observation, reward, terminated, truncated, info = env.step(action)
+        motion = motions[-1]
+        for robot in range(3):
+            contact = motion.contact[robot].tolist()
+            clearance = motion.clearance[robot].tolist()
+            down, up, target, factor = EDGES[states[robot]]
+            taken = (
+                deltas[robot] + 1 >= DWELL
+                and all(contact[foot] for foot in down)
+                and all(not contact[foot] and clearance[foot] >= SWING_HEIGHT for foot in up)
+            )
+            states[robot] = target if taken else states[robot]
+            deltas[robot] = 0 if taken else deltas[robot] + 1
+            changes += taken
+            assert info["changed"][robot] == taken
+            stance = [states[robot] == 0, states[robot] == 1, True, True]
+            assert info["shows_stance"][robot] == (contact == stance)
+            terms = sum(float(term[robot]) for term in info["reward_terms"].values())
+            bonus = env.config.reward.bonus * factor if taken else 0.0
+            assert reward[robot] == pytest.approx(terms + bonus, abs=1e-9)
+            if terminated[robot] or truncated[robot]:
+                falls += bool(terminated[robot])
+                check(info["final_obs"], robot)
+                states[robot] = deltas[robot] = 0
+            check(observation, robot)
+    assert changes > 30
+    assert falls > 0
+
+
+def test_no_quantity_of_the_observation_is_a_step_late(monkeypatch):
+    env = hop(3, heading_interval=1000)
+    slices = env.observe.slices
+    env.reset(seed=2)
+    qpos, _ = env.world.state()
+    heading = 2 * np.arctan2(qpos[:, 6], qpos[:, 3])
+    motions = keep_motions(env, monkeypatch)
+    for action in arbitrary_actions(3, 25, 3, size=0.4):
+        observation, *_ = env.step(action)
+        qpos, qvel = env.world.state()
+        for robot in range(3):
+            seen = {name: observation[robot, part] for name, part in slices.items()}
+            down, velocity = np.zeros(3), np.zeros(3)
+            back = np.zeros(4)
+            mujoco.mju_negQuat(back, qpos[robot, 3:7])
+            mujoco.mju_rotVecQuat(down, np.array([0.0, 0.0, -1.0]), back)
+            mujoco.mju_rotVecQuat(velocity, qvel[robot, :3], back)
+            forward = np.zeros(3)
+            mujoco.mju_rotVecQuat(forward, np.array([1.0, 0.0, 0.0]), qpos[robot, 3:7])
+            error = np.arctan2(forward[1], forward[0]) - heading[robot]
+            error = (error + np.pi) % (2 * np.pi) - np.pi
+            loop = env.config.heading_loop
+            limit = loop.yaw_rate_limit
+            now = {
+                "joint_position": qpos[robot, 7:] - STANCE,
+                "joint_velocity": qvel[robot, 6:] / 10,
+                "gravity_b": down,
+                "base_linear_velocity_b": velocity,
+                "base_angular_velocity_b": qvel[robot, 3:6],
+                "contact": motions[-1].contact[robot],
+                "yaw_rate_command": [np.clip(-loop.heading_gain * error, -limit, limit)],
+                "last_action": action[robot],
+            }
+            for name, value in now.items():
+                np.testing.assert_allclose(seen[name], value, rtol=1e-5, atol=1e-5, err_msg=name)
+    changed = np.abs(observation - env.step(action)[0]).max(axis=0)
+    moving = np.concatenate([changed[slices[name]] for name in now if name != "last_action"])
+    assert (moving > 1e-4).mean() > 0.8, "a late quantity would show"
+
+
+def test_the_action_shown_and_paid_for_is_the_clipped_one():
+    env = hop(1)
+    env.reset(seed=0)
+    limit = float(env.single_action_space.high[0])
+    action = np.zeros((1, 12))
+    action[0, 4] = limit + 1000.0
+    observation, _, _, _, info = env.step(action)
+    shown = observation[0, env.observe.slices["last_action"]]
+    np.testing.assert_array_equal(shown, limit * np.eye(12)[4])
+    paid = info["reward_terms"]["action_rate"].item()
+    assert paid == pytest.approx(env.config.reward.action_rate * limit**2)
+
+
+def test_an_action_that_is_no_number_is_refused():
+    env = hop(2)
+    env.reset(seed=0)
+    action = np.zeros((2, 12))
+    action[1, 5] = np.nan
+    with pytest.raises(GaitshiftError, match="robot 1, FR_KFE, is not a number"):
+        env.step(action)
+
+
+def test_what_was_returned_is_never_written_to_again():
+    env = hop(3, episode_steps=4)
+    kept = [(env.reset(seed=0)[0],)]
+    copies = [(kept[0][0].copy(),)]
+    for action in arbitrary_actions(0, 12, 3):
+        observation, reward, terminated, truncated, info = env.step(action)
+        terms = (*info["reward_terms"].values(), info["changed"], info.get("final_obs", reward))
+        kept.append((observation, reward, terminated, truncated, *terms))
+        copies.append(tuple(part.copy() for part in kept[-1]))
+    for step, copy in zip(kept, copies, strict=True):
+        for part, twin in zip(step, copy, strict=True):
+            np.testing.assert_array_equal(part, twin)
+    observations = [step[0] for step in kept]
+    for index, observation in enumerate(observations):
+        assert not any(np.shares_memory(observation, other) for other in observations[:index])
+
+
+def test_writing_into_what_was_returned_changes_nothing_to_come():
+    actions = arbitrary_actions(0, 12, 2)
+    untouched = run(hop(2, episode_steps=5), actions)
+    env = hop(2, episode_steps=5)
+    env.reset(seed=5)[0][:] = 9.0
+    for action, expected in zip(actions, untouched[1:], strict=True):
+        mine = action.copy()
+        observation, reward, *ended, _ = env.step(mine)
+        np.testing.assert_array_equal(observation, expected[0])
+        np.testing.assert_array_equal(reward, expected[1])
+        observation[:], reward[:], mine[:] = 9.0, 9.0, 9.0
+        for flags in ended:
+            flags[:] = True
+
+
+def test_every_entry_of_the_observation_lives_but_the_commanded_speed():
+    env = hop(6, heading_interval=20)
+    env.reset(seed=0)
+    actions = arbitrary_actions(1, 120, 6, size=1.5)
+    seen = np.stack([env.step(action)[0] for action in actions])
+    still = np.flatnonzero(np.ptp(seen, axis=(0, 1)) == 0)
+    speed = env.observe.slices["forward_speed_command"]
+    assert still.tolist() == list(range(speed.start, speed.stop))
+
+
+def test_the_papers_environment_shows_no_command_and_asks_for_no_turn():
+    env = GaitEnv(HOP, FLAT, 2, config=EnvConfig.paper(), threads=1)
+    env.reset(seed=0)
+    assert not {"forward_speed_command", "yaw_rate_command", "last_action"} & set(
+        env.observe.slices
+    )
+    for action in arbitrary_actions(0, 5, 2, size=0.3):
+        *_, info = env.step(action)
+        turning = env.world.motion.base_angular_velocity_b[:, 2]
+        np.testing.assert_allclose(info["reward_terms"]["yaw_rate"], -25.0 * turning**2)
+        for name in ("stance_pattern", "slip", "action_rate"):
+            assert not info["reward_terms"][name].any()
+
+
+# The ends of episodes ---------------------------------------------------------------------------
+
+
+def test_a_cut_episodes_final_observation_is_what_an_uncut_twin_sees():
+    cut, uncut = hop(3, episode_steps=15), hop(3, episode_steps=1000)
+    actions = arbitrary_actions(4, 15, 3, size=0.3)
+    *_, last = run(cut, actions)
+    *_, twin = run(uncut, actions)
+    observation, reward, terminated, truncated, info = last
+    assert truncated.tolist() == [True] * 3
+    assert terminated.tolist() == [False] * 3
+    np.testing.assert_array_equal(info["final_obs"], twin[0])
+    np.testing.assert_array_equal(info["_final_obs"], [True] * 3)
+    np.testing.assert_array_equal(reward, twin[1])
+    assert not np.array_equal(observation, info["final_obs"])
+    assert "final_obs" not in twin[4]
+
+
+def test_a_robot_is_shown_the_same_whether_or_not_another_falls():
+    falling, standing = hop(2), hop(2)
+    falling.reset(seed=3)
+    standing.reset(seed=3)
+    fallen = False
+    for action in arbitrary_actions(0, 150, 2, size=0.3):
+        twin, *_ = standing.step(action)
+        action[0] = FOLD[0]
+        observation, _, terminated, _, info = falling.step(action)
+        fallen |= terminated[0]
+        np.testing.assert_array_equal(observation[1], twin[1])
+        if terminated.any():
+            np.testing.assert_array_equal(info["_final_obs"], [True, False])
+    assert fallen
+
+
+def test_a_body_on_the_ground_terminates_and_is_shown_in_the_final_observation_alone():
+    env = hop(2)
+    env.reset(seed=0)
+    slices = env.observe.slices
+    for _ in range(200):
+        action = np.concatenate([np.zeros((1, 12)), FOLD])
+        observation, _, terminated, truncated, info = env.step(action)
+        if terminated.any():
+            break
+    assert terminated.tolist() == [False, True]
+    assert truncated.tolist() == [False, False]
+    lying, fresh = info["final_obs"][1], observation[1]
+    assert lying[slices["base_height"]].item() < 0.3
+    np.testing.assert_allclose(lying[slices["last_action"]], FOLD[0])
+    # The fresh episode: upright, on its feet in about the stance, nothing done yet.
+    assert abs(fresh[slices["base_height"]].item() - ANYMAL_B.stance_height) < 0.06
+    np.testing.assert_allclose(fresh[slices["gravity_b"]], [0, 0, -1], atol=1e-6)
+    assert np.abs(fresh[slices["joint_position"]]).max() <= env.config.joint_noise + 1e-6
+    assert np.abs(fresh[slices["base_linear_velocity_b"]]).max() <= 1.5 * env.config.velocity_noise
+    for name in ("joint_velocity", "base_angular_velocity_b", "last_action", "steps_in_state"):
+        assert not fresh[slices[name]].any(), name
+    np.testing.assert_array_equal(fresh[slices["machine_state"]], [1, 0])
+
+
+def test_a_robot_that_falls_in_its_last_step_is_terminated_and_not_truncated():
+    env = hop(1)
+    env.reset(seed=0)
+    steps = next(step for step in range(1, 200) if env.step(FOLD)[2].any())
+    short = hop(1, episode_steps=steps)
+    short.reset(seed=0)
+    for _ in range(steps):
+        _, _, terminated, truncated, _ = short.step(FOLD)
+    assert (terminated.item(), truncated.item()) == (True, False)
+
+
+def test_spread_ages_cut_the_first_episodes_at_different_steps_and_the_next_after_a_whole_one():
+    env = hop(6, episode_steps=40)
+    env.reset(seed=0)
+    env.spread_ages()
+    ends = [[] for _ in range(6)]
+    for step in range(85):
+        _, _, terminated, truncated, _ = env.step(np.zeros((6, 12)))
+        assert not terminated.any()
+        for robot in np.flatnonzero(truncated):
+            ends[robot].append(step)
+    assert len({end[0] for end in ends}) > 3
+    assert all(end[1] - end[0] == 40 for end in ends)
+
+
+# The ground and the pushes ----------------------------------------------------------------------
+
+
+def test_a_robot_that_comes_near_the_border_starts_anew_inside():
+    ground = perlin(0.02, seed=0, length=6.0, width=4.0)
+    env = hop(3, ground=ground, terrain_margin=0.5)
+    env.reset(seed=0)
+    x0, x1, _, y1 = ground.extent
+    # Robot 0 just inside the margin of 0.5 m, robots 1 and 2 just outside, along x and along y.
+    xy = np.array([[x0 + 0.6, 0.0], [x1 - 0.4, 0.0], [3.0, y1 - 0.4]])
+    env.world.place(np.arange(3), xy=xy, yaw=np.zeros(3))
+    _, _, terminated, truncated, info = env.step(np.zeros((3, 12)))
+    assert truncated.tolist() == [False, True, True]
+    assert not terminated.any()
+    np.testing.assert_array_equal(info["_final_obs"], [False, True, True])
+    position = env.world.motion.base_position_w
+    np.testing.assert_allclose(position[0, :2], xy[0], atol=0.02)
+    assert ground.contains(position[1:, :2], 0.5).all()
+
+
+def test_level_ground_has_no_border():
+    env = hop(1, ground=flat(4.0, 4.0))
+    env.reset(seed=0)
+    env.world.place(np.array([0]), xy=np.array([[100.0, -50.0]]), yaw=np.zeros(1))
+    _, _, terminated, truncated, _ = env.step(np.zeros((1, 12)))
+    assert not terminated.item()
+    assert not truncated.item()
+
+
+def test_robots_start_on_the_ground_wherever_they_start():
+    env = hop(16, ground=perlin(0.15, seed=1, length=8.0, width=8.0))
+    env.reset(seed=0)
+    clearance = env.world.motion.clearance
+    np.testing.assert_allclose(clearance.min(axis=1), 0.0, atol=1e-9)
+    assert np.ptp(env.world.motion.base_position_w[:, :2], axis=0).min() > 1.0
+    assert np.ptp(env.world.motion.yaw) > 3.0
+
+
+def test_new_ground_lets_robots_go_on_as_they_moved():
+    env = hop(3, episode_steps=12)
+    env.reset(seed=0)
+    centre = np.array([[9.0, 1.0], [10.0, -1.0], [11.0, 0.0]])
+    env.world.place(np.arange(3), xy=centre, yaw=np.array([0.0, 1.0, 2.0]))
+    actions = arbitrary_actions(6, 12, 3, size=0.2)
+    for action in actions[:5]:
+        env.step(action)
+    qpos, qvel = env.world.state()
+    env.set_terrain(perlin(0.05, seed=2, length=20.0, width=20.0))
+    after, velocity = env.world.state()
+    kept = np.arange(19) != 2
+    np.testing.assert_array_equal(after[:, kept], qpos[:, kept])
+    np.testing.assert_array_equal(velocity, qvel)
+    assert np.abs(after[:, 2] - qpos[:, 2]).max() < 0.06
+    for step, action in enumerate(actions[5:], start=6):
+        observation, _, terminated, truncated, _ = env.step(action)
+        assert np.isfinite(observation).all()
+        assert not terminated.any()
+        assert truncated.tolist() == [step == 12] * 3, "the episode's clock went on"
+
+
+def test_a_push_moves_the_robot_its_way(monkeypatch):
+    env = hop(8)
+    env.reset(seed=0)
+    env.push_at_most(400.0)
+    forces, push = [], env.world.push
+
+    def kept(force_w):
+        forces.append(force_w.copy())
+        push(force_w)
+
+    monkeypatch.setattr(env.world, "push", kept)
+    velocities = []
+    for _ in range(env.config.push.interval + 2 * env.config.push.duration):
+        env.step(np.zeros((8, 12)))
+        velocities.append(env.world.motion.base_linear_velocity_w)
+    forces, velocities = np.array(forces), np.array(velocities)
+    assert not forces[0].any(), "nobody is pushed at the start"
+    assert np.linalg.norm(forces, axis=2).max() <= 400.0 * np.hypot(1, env.config.push.vertical)
+    pushed = 0
+    for robot in range(8):
+        strong = np.linalg.norm(forces[:, robot, :2], axis=1) > 100.0
+        begins = np.flatnonzero(strong[1:] & ~strong[:-1]) + 1
+        for begin in begins[begins + 5 < len(velocities)]:
+            force = forces[begin, robot, :2]
+            gained = (velocities[begin + 4, robot] - velocities[begin - 1, robot])[:2]
+            # 0.05 s of 100 N on 30 kg is 0.17 m/s; the legs take up some of it.
+            assert gained @ force / np.linalg.norm(force) > 0.05
+            pushed += 1
+    assert pushed >= 4
+    env.push_at_most(0.0)
+    forces = []
+    env.step(np.zeros((8, 12)))
+    assert not np.any(forces)
+
+
+def test_without_pushes_a_standing_robot_stays_where_it_stands():
+    env = hop(4, velocity_noise=0.0, joint_noise=0.0)
+    env.reset(seed=0)
+    before = env.world.motion.base_position_w
+    for _ in range(100):
+        env.step(np.zeros((4, 12)))
+    assert np.abs(env.world.motion.base_position_w - before)[:, :2].max() < 0.05
+
+
+@pytest.mark.parametrize("scale", [0.25, 1.0])
+def test_the_swing_scale_is_the_share_of_the_swing_height_that_feet_must_reach(scale, monkeypatch):
+    asked = 0.08
+    env = GaitEnv(with_swing_height(asked), FLAT, 4, config=EnvConfig(), threads=1)
+    env.swing_scale = scale
+    env.reset(seed=0)
+    motions = keep_motions(env, monkeypatch)
+    heights = []
+    for action in arbitrary_actions(1, 150, 4, size=1.5):
+        *_, info = env.step(action)
+        motion = motions[-1]
+        front = np.where(motion.contact[:, :2], -np.inf, motion.clearance[:, :2])
+        heights += front.max(axis=1)[info["changed"]].tolist()
+    assert len(heights) > 5
+    assert scale * asked <= min(heights) < scale * asked + 0.03
+
+
+def with_swing_height(height):
+    """HOP with another swing height [m] in every guard."""
+    edges = (replace(edge, guard=replace(edge.guard, swing_height=height)) for edge in HOP.edges)
+    return replace(HOP, edges=tuple(edges))

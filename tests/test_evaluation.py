@@ -1,0 +1,209 @@
+"""Rollouts, evaluations and the demonstration with the shipped policies."""
+
+import numpy as np
+import pytest
+
+from gaitshift import policy
+from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import (
+    DemoConfig,
+    EvaluationConfig,
+    RolloutConfig,
+    evaluate,
+    rollout,
+    run_demo,
+)
+from gaitshift.gait_analysis import measure
+from gaitshift.log import Log
+from gaitshift.switching import Driver, HeightDifference
+from gaitshift.terrain import flat, from_spec
+from gaitshift.world import World
+
+
+@pytest.fixture(scope="module")
+def trot() -> policy.Policy:
+    return policy.load("trot")
+
+
+def test_a_run_is_the_same_for_the_same_seed_and_differs_for_another(trot: policy.Policy) -> None:
+    def positions(seed: int) -> np.ndarray:
+        config = EvaluationConfig(terrain="perlin:0.05", episodes=4, seconds=1.0, seed=seed)
+        return evaluate(trot, config)[1].qpos
+
+    first, again, other = positions(1), positions(1), positions(2)
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_robots_run_alone_as_they_run_in_a_batch(trot: policy.Policy) -> None:
+    """Robot i of a batch meets the same motion as a robot alone that starts as it did."""
+
+    def run(start_y: list[float]) -> Log:
+        n = len(start_y)
+        world = World(trot.robot, flat(10.0, 10.0), n)
+        driver = Driver({"trot": trot}, n, start="trot")
+        config = RolloutConfig(seconds=1.0, joint_noise=0.0)
+        start = np.stack([np.zeros(n), np.array(start_y)], axis=1)
+        return rollout(world, driver, config, start_xy=start, rng=np.random.default_rng(0))
+
+    together = run([-1.0, 0.5])
+    for robot, y in enumerate([-1.0, 0.5]):
+        alone = run([y])
+        # onnxruntime multiplies one row in another order than two: a rounding error that grows.
+        np.testing.assert_allclose(together.qpos[:30, robot], alone.qpos[:30, 0], atol=1e-4)
+
+
+def _synthetic_log(*, speed: float, period: int, steps: int, fallen_from: int | None) -> Log:
+    """Robot 0 moves along x at `speed`, its feet in a perfect trot of `period` steps; robot 1
+    lies still."""
+    time = np.arange(1, steps + 1) / 100
+    qpos, qvel = np.zeros((steps, 2, 19)), np.zeros((steps, 2, 18))
+    qpos[..., 3] = 1.0
+    qpos[:, 0, 0] = speed * time
+    qvel[:, 0, 0] = speed
+    qvel[:, 0, 6] = 2.0
+    torque = np.zeros((steps, 2, 12))
+    torque[:, 0, 0] = -30.0
+    left = (np.arange(steps) % period) < period // 2
+    contact = np.zeros((steps, 2, 4), dtype=bool)
+    contact[:, 0] = np.where(left[:, None], [1, 0, 0, 1], [0, 1, 1, 0])
+    fallen = np.zeros((steps, 2), dtype=bool)
+    if fallen_from is not None:
+        fallen[fallen_from:, 1] = True
+    zeros = np.zeros((steps, 2))
+    return Log(
+        time=time,
+        qpos=qpos,
+        qvel=qvel,
+        torque=torque,
+        contact=contact,
+        foot_position_w=np.zeros((steps, 2, 4, 3)),
+        clearance=np.zeros((steps, 2, 4)),
+        foot_height=np.zeros((steps, 2, 4)),
+        k=zeros,
+        threshold=zeros,
+        gait=np.zeros((steps, 2), dtype=np.int64),
+        machine_state=np.stack([np.where(left, 0, 1), np.zeros(steps, dtype=np.int64)], axis=1),
+        stance_shown=np.stack([np.ones(steps, dtype=bool), np.zeros(steps, dtype=bool)], axis=1),
+        fallen=fallen,
+        command=np.tile([1.2, 0.0], (steps, 2, 1)),
+        gaits=("trot",),
+        robot="anymal_b",
+        terrain="flat",
+        terrain_height=np.zeros((2, 2)),
+        terrain_size=np.ones(2),
+        terrain_origin=np.zeros(2),
+    )
+
+
+def test_figures_of_a_perfect_trot_are_those_it_was_made_of(trot: policy.Policy) -> None:
+    """Period 40 steps: 2.5 Hz. Power 30 N·m · 2 rad/s = 60 W over 20 kg · 9.81 m/s² · 0.9 m/s."""
+    log = _synthetic_log(speed=0.9, period=40, steps=1200, fallen_from=0)
+    figures = measure(log, {"trot": trot.machine}, mass=20.0)
+    assert figures["survival"] == 0.5
+    assert figures["speed_mean"] == pytest.approx(0.9)
+    assert figures["speed_rmse"] == pytest.approx(0.3)
+    assert figures["pattern_fraction"] == 1.0
+    assert figures["cycles_per_s"] == pytest.approx(2.5, abs=0.01)
+    assert figures["touchdowns_per_cycle"] == pytest.approx([1.0] * 4, abs=0.05)
+    assert figures["duty_factor"] == pytest.approx([0.5] * 4, abs=0.01)
+    assert figures["cost_of_transport"] == pytest.approx(60 / (20 * 9.81 * 0.9))
+
+
+def test_robots_count_until_their_fall_and_the_warm_up_does_not_count(trot: policy.Policy) -> None:
+    """The still robot is in the mean while it is on its feet: (0.9 + 0) / 2."""
+    log = _synthetic_log(speed=0.9, period=40, steps=1200, fallen_from=None)
+    assert measure(log, {"trot": trot.machine}, mass=20.0)["speed_mean"] == pytest.approx(0.45)
+    log = _synthetic_log(speed=0.9, period=40, steps=1200, fallen_from=200)
+    assert measure(log, {"trot": trot.machine}, mass=20.0)["speed_mean"] == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("gait", policy.shipped())
+def test_shipped_policies_walk_in_their_gait(gait: str) -> None:
+    """The floors of the README with room for the small sample."""
+    config = EvaluationConfig(episodes=32, seconds=5.0)
+    figures, _ = evaluate(policy.load(gait), config)
+    assert figures["survival"] == 1.0
+    assert figures["speed_mean"] == pytest.approx(1.2, abs=0.15)
+    assert figures["pattern_fraction"] >= 0.6
+    assert 1.5 <= figures["cycles_per_s"] <= 3.5
+
+
+def test_the_demo_shifts_to_the_rough_gait_on_rough_ground_and_back_after_it() -> None:
+    config = DemoConfig(track="flat@4,perlin:0.10@8,flat@8", episodes=4, seed=40)
+    log, summaries = run_demo(config, {gait: policy.load(gait) for gait in config.used})
+    assert all(summary["survived"] and summary["finished"] for summary in summaries)
+    for summary in summaries:
+        shifts = [(shift["from"], shift["to"]) for shift in summary["switches"]]
+        assert shifts == [("trot", "bound"), ("bound", "trot")]
+        assert 4.0 < summary["switches"][0]["x_m"] < 12.0 < summary["switches"][1]["x_m"] + 0.75
+        assert summary["switches"][0]["k"] == HeightDifference().beta
+    assert log.qpos.shape[1] == 4
+
+
+def test_on_flat_ground_alone_no_gait_is_changed() -> None:
+    config = DemoConfig(track="flat@6,flat@6", episodes=4)
+    _, summaries = run_demo(config, {gait: policy.load(gait) for gait in config.used})
+    assert all(summary["survived"] and not summary["switches"] for summary in summaries)
+
+
+def test_a_schedule_is_kept_to_the_step() -> None:
+    config = DemoConfig(gaits=("trot", "bound", "trot"), at=(1.0, 2.5), episodes=2)
+    log, summaries = run_demo(config, {gait: policy.load(gait) for gait in config.used})
+    for summary in summaries:
+        assert [shift["time_s"] for shift in summary["switches"]] == [1.0, 2.5]
+        assert [shift["to"] for shift in summary["switches"]] == ["bound", "trot"]
+    assert log.time[-1] == pytest.approx(5.5)
+
+
+@pytest.mark.parametrize(
+    ("config", "says"),
+    [
+        (lambda: EvaluationConfig(episodes=0), "0 episodes: 1 to 100000"),
+        (lambda: EvaluationConfig(seconds=-1.0), "-1.0 seconds: more than 0"),
+        (lambda: EvaluationConfig(seed=-1), "seed -1"),
+        (lambda: DemoConfig(episodes=0), "0 episodes"),
+        (lambda: DemoConfig(gaits=("trot",)), "one gait alone"),
+        (lambda: DemoConfig(gaits=("trot", "pace"), at=(1.0, 2.0)), "2 times for 2 gaits"),
+        (lambda: DemoConfig(gaits=("trot", "pace", "trot"), at=(2.0, 1.0)), "positive and rising"),
+        (lambda: DemoConfig(every=0.0), "a gait every 0.0 s"),
+    ],
+)
+def test_absurd_numbers_are_refused_with_what_would_be_right(config, says: str) -> None:
+    with pytest.raises(GaitshiftError, match=says.replace("(", r"\(")):
+        config()
+
+
+def test_a_log_comes_back_from_its_file_as_it_was(tmp_path, trot: policy.Policy) -> None:
+    config = EvaluationConfig(episodes=2, seconds=0.3)
+    _, log = evaluate(trot, config)
+    log.save(tmp_path / "log.npz")
+    back = Log.load(tmp_path / "log.npz")
+    assert back.gaits == log.gaits
+    assert back.terrain == "flat"
+    for name in ("qpos", "contact", "k", "terrain_height", "time"):
+        assert np.array_equal(getattr(back, name), getattr(log, name))
+        assert getattr(back, name).dtype == getattr(log, name).dtype
+
+
+def test_a_damaged_or_foreign_log_is_named(tmp_path) -> None:
+    path = tmp_path / "log.npz"
+    with pytest.raises(GaitshiftError, match="no log file"):
+        Log.load(path)
+    path.write_bytes(b"PK\x03\x04 not really")
+    with pytest.raises(GaitshiftError, match=r"log\.npz is not a whole npz file"):
+        Log.load(path)
+    np.savez(path, time=np.zeros(3))
+    with pytest.raises(GaitshiftError, match="lacks 'qpos'"):
+        Log.load(path)
+
+
+def test_grounds_of_an_evaluation_reach_as_far_as_robots_can_walk() -> None:
+    from gaitshift.evaluation.evaluate import RUN_UP, _grounds
+
+    grounds = _grounds(EvaluationConfig(terrain="perlin:0.1"), RolloutConfig(seconds=10.0))
+    assert len(grounds) == 8
+    assert all(g.extent[0] == -RUN_UP and g.extent[1] > 1.2 * 10.0 + 1.0 for g in grounds)
+    assert len({g.height.tobytes() for g in grounds}) == 8
+    slope = from_spec("slope:15", seed=0, length=10.0, width=4.0)
+    assert slope.height.max() == pytest.approx(10 * np.tan(np.radians(15)), rel=1e-6)

@@ -1,0 +1,57 @@
+"""Ships a trained policy: the network, its curve and its figures go into the package.
+
+Usage: python tools/ship_policy.py RUN...     (`make policies` trains and ships all)
+"""
+
+import csv
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from gaitshift import policy
+from gaitshift.evaluation import EvaluationConfig, evaluate
+from gaitshift.plots import training_curves
+
+POLICIES = Path(policy.__file__).parent / "policies"
+CURVES = Path(__file__).parent.parent / "docs" / "results" / "training"
+GROUNDS = ("flat", "perlin:0.10", "perlin:0.15", "slope:10", "stairs:0.05", "step:0.10")
+COLUMNS = ("iteration", "stage", "steps", "wall_s", "reward", "speed", "survival", "changes_per_s")
+EVERY = 10
+
+
+def ship(run: Path) -> None:
+    """Copies the policy of `run`, thins its curve, and evaluates it on every ground."""
+    loaded = policy.load(run / "policy.onnx")
+    name = loaded.gait
+    figures = {}
+    for ground in GROUNDS:
+        figures[ground], _ = evaluate(loaded, EvaluationConfig(terrain=ground))
+        print(name, ground, json.dumps(figures[ground]))
+    shutil.copyfile(run / "policy.onnx", POLICIES / f"{name}.onnx")
+    record = {
+        **loaded.info.training,
+        "evaluation": {"command": f"gaitshift evaluate {name} --terrain GROUND", **figures},
+    }
+    (POLICIES / f"{name}.json").write_text(json.dumps(_rounded(record), indent=1) + "\n")
+    with (run / "progress.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if int(row["iteration"]) % EVERY == 0]
+    with (POLICIES / f"{name}.csv").open("w", newline="") as file:
+        lines = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
+        lines.writeheader()
+        lines.writerows(rows)
+    CURVES.mkdir(parents=True, exist_ok=True)
+    training_curves(run / "progress.csv", CURVES / f"{name}.png")
+
+
+def _rounded(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_rounded(item) for item in value]
+    return round(value, 4) if isinstance(value, float) else value
+
+
+if __name__ == "__main__":
+    for argument in sys.argv[1:]:
+        ship(Path(argument))
