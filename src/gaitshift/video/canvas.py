@@ -1,0 +1,137 @@
+"""Pictures of a model, drawn by OpenGL into arrays, on machines with and without a screen."""
+
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from gaitshift.errors import GaitshiftError
+
+_MAX_GEOMS = 2000
+
+_GLOW = 0.35
+"""Light that a ball gives by itself: with what falls on it, it shows about its own colour."""
+
+_FONT = mujoco.mjtFontScale.mjFONTSCALE_100.value
+
+
+class VideoUnavailable(GaitshiftError):  # noqa: N818  a state of the machine, not a mistake
+    """Videos cannot be made on this machine; everything else works on it all the same."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """Where a camera stands and looks."""
+
+    target: tuple[float, float, float]
+    """World point in the middle of the picture [m]."""
+    distance: float
+    """Of the camera from there [m]."""
+    azimuth: float
+    """Heading in which it looks, about world z [degree]."""
+    elevation: float
+    """Pitch at which it looks, negative: down [degree]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ball:
+    """A ball that glows by itself, drawn over the model."""
+
+    position: Float[np.ndarray, " 3"]
+    """Centre, world frame [m]."""
+    radius: float
+    """[m]"""
+    rgba: tuple[float, float, float, float]
+    """Red, green, blue and opacity in [0, 1]."""
+
+
+class Canvas:
+    """Draws one model in one size. To be closed when done.
+
+    Raises `VideoUnavailable` where there is no OpenGL. `MUJOCO_GL` is obeyed where it is set; where
+    it is not, Linux without a display draws by EGL, which needs no screen.
+    """
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+        self._model = model
+        self._rect = mujoco.MjrRect(0, 0, width, height)
+        self._pixels = np.empty((height, width, 3), dtype=np.uint8)
+        self._gl: Any = None
+        try:
+            self._gl = _open_context(width, height)
+            self._context = mujoco.MjrContext(model, _FONT)
+        except Exception as error:  # each way to OpenGL fails in its own class
+            if self._gl is not None:
+                self._gl.free()
+            raise VideoUnavailable(
+                f"no OpenGL to draw videos with ({_first_line(error)}); "
+                "on Debian or Ubuntu: apt-get install libegl1 libgl1"
+            ) from error
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._scene = mujoco.MjvScene(model, _MAX_GEOMS)
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = 0
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
+        self._options = mujoco.MjvOption()
+
+    def close(self) -> None:
+        """Frees OpenGL's memory."""
+        self._context.free()
+        self._gl.free()
+
+    def upload_texture(self, texture: int) -> None:
+        """Shows what has been written into the model's `tex_data` since."""
+        mujoco.mjr_uploadTexture(self._model, self._context, texture)
+
+    def draw(
+        self, data: mujoco.MjData, view: View, balls: Sequence[Ball] = ()
+    ) -> UInt8[np.ndarray, "height width 3"]:
+        """The model at `data`, seen from `view`: rows from the top, red, green, blue."""
+        camera = mujoco.MjvCamera()
+        camera.lookat[:] = view.target
+        camera.distance, camera.azimuth, camera.elevation = (
+            view.distance,
+            view.azimuth,
+            view.elevation,
+        )
+        every = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(self._model, data, self._options, None, camera, every, self._scene)
+        for ball in balls:
+            self._add(ball)
+        mujoco.mjr_render(self._rect, self._scene, self._context)
+        mujoco.mjr_readPixels(self._pixels, None, self._rect, self._context)
+        return np.ascontiguousarray(self._pixels[::-1])
+
+    def _add(self, ball: Ball) -> None:
+        geom = self._scene.geoms[self._scene.ngeom]
+        mujoco.mjv_initGeom(
+            geom,
+            mujoco.mjtGeom.mjGEOM_SPHERE,
+            np.full(3, ball.radius),
+            ball.position,
+            np.eye(3).ravel(),
+            np.array(ball.rgba, dtype=np.float32),
+        )
+        geom.emission = _GLOW
+        self._scene.ngeom += 1
+
+
+def _open_context(width: int, height: int) -> Any:
+    """An OpenGL context, made current."""
+    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform == "linux" and not display and not os.environ.get("MUJOCO_GL"):
+        # MuJoCo reads MUJOCO_GL once, when it is imported: too early to set it for the user here.
+        from mujoco.egl import GLContext
+    else:
+        from mujoco.gl_context import GLContext
+    context = GLContext(width, height)
+    context.make_current()
+    return context
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip() or type(error).__name__).splitlines()[0]

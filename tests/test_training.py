@@ -1,0 +1,711 @@
+"""Training: recipes, grounds, runs that break off and go on, and values with a closed form."""
+
+import csv
+import json
+import shutil
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import pytest
+import torch
+from tensordict import TensorDict
+
+from gaitshift import gaits, policy
+from gaitshift.env import EnvConfig, GaitEnv
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward import RewardConfig
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.terrain import flat
+from gaitshift.training.config_file import recipe_from_dict
+from gaitshift.training.ground import draw_ground, stage_at
+from gaitshift.training.learner import Learner
+from gaitshift.training.recipe import PRESETS, PpoConfig, Recipe, Stage
+from gaitshift.training.run import Run
+from gaitshift.world import PushConfig
+
+TROT = gaits.load("trot")
+TINY = Recipe(
+    env=EnvConfig(episode_steps=30, heading_interval=11),
+    ppo=PpoConfig(hidden=(16, 8), epochs=2, mini_batches=2),
+    stages=(
+        Stage(name="flat", iterations=3, push=50.0),
+        Stage(name="rough", iterations=3, amplitude=0.1, redraw_every=2, push=100.0),
+    ),
+    robots=4,
+    steps=8,
+    swing_from=1,
+    swing_until=4,
+    checkpoint_every=2,
+    threads=1,
+)
+ABC = replace(
+    TINY,
+    stages=(
+        Stage(name="a", iterations=3),
+        Stage(name="b", iterations=4, amplitude=0.1),
+        Stage(name="c", iterations=5, amplitude=0.2),
+    ),
+)
+
+
+class KilledError(Exception):
+    """Stands for whatever ends a process."""
+
+
+def kill_at(iteration, error=KilledError):
+    """A report that breaks the run off after this iteration, before its checkpoint."""
+
+    def report(row):
+        if row["iteration"] == iteration:
+            raise error
+
+    return report
+
+
+def create(folder, *, seed=7, recipe=TINY, **options):
+    return Run.create(folder, TROT, recipe, seed=seed, command="gaitshift train trot", **options)
+
+
+def rows(folder):
+    """progress.csv without the one column that depends on the clock."""
+    with (folder / "progress.csv").open(newline="") as file:
+        return [
+            {name: value for name, value in row.items() if name != "wall_s"}
+            for row in csv.DictReader(file)
+        ]
+
+
+def weights(run):
+    """Every number of networks, statistics and optimiser, by name."""
+    flat_state = {}
+
+    def collect(name, value):
+        if isinstance(value, dict):
+            for key, part in value.items():
+                collect(f"{name}/{key}", part)
+        elif isinstance(value, list | tuple):
+            for key, part in enumerate(value):
+                collect(f"{name}/{key}", part)
+        else:
+            flat_state[name] = value.clone() if isinstance(value, torch.Tensor) else value
+
+    collect("", run.learner.ppo.save())
+    return flat_state
+
+
+def same_bits(one, other):
+    return one.keys() == other.keys() and all(
+        torch.equal(value, other[name]) if isinstance(value, torch.Tensor) else value == other[name]
+        for name, value in one.items()
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A run that was never broken off, and the rows that it reported."""
+    run = create(tmp_path_factory.mktemp("training") / "whole")
+    reported = []
+    run.train(reported.append)
+    return run, reported
+
+
+# Recipes ----------------------------------------------------------------------------------------
+
+
+def test_the_paper_preset_has_the_papers_figures():
+    recipe = PRESETS["paper"]()
+    assert (recipe.robots, recipe.steps, recipe.iterations) == (30, 100, 500)
+    assert recipe.ppo.hidden == (256, 128, 32)
+    assert [stage.amplitude for stage in recipe.stages] == [0.0]
+    assert recipe.env.reward == RewardConfig.paper()
+    assert recipe.env.forward_speed == 1.2
+    assert recipe.env.gains == "paper"
+    assert recipe.swing_scale(0) == 1.0
+
+
+@pytest.mark.parametrize(
+    "faulty",
+    [
+        {"robots": 0},
+        {"robots": 65537},
+        {"steps": 0},
+        {"stages": ()},
+        {"stages": (Stage(name="flat", iterations=0),)},
+        {"stages": (Stage(name="flat", iterations=5), Stage(name="rough", iterations=-1))},
+    ],
+)
+def test_recipes_that_cannot_be_run_are_refused(faulty):
+    with pytest.raises(
+        GaitshiftError,
+        match=f"{'iterations' if 'stages' in faulty else next(iter(faulty))}.*would be right",
+    ):
+        replace(TINY, **faulty)
+
+
+@pytest.mark.parametrize(
+    ("iterations", "stages"),
+    [
+        (1, [("a", 1)]),
+        (3, [("a", 3)]),
+        (5, [("a", 3), ("b", 2)]),
+        (12, [("a", 3), ("b", 4), ("c", 5)]),
+        (20, [("a", 3), ("b", 4), ("c", 13)]),
+    ],
+)
+def test_a_recipe_is_cut_or_its_last_stage_drawn_out(iterations, stages):
+    recipe = ABC.with_iterations(iterations)
+    assert [(stage.name, stage.iterations) for stage in recipe.stages] == stages
+    assert recipe.iterations == iterations
+
+
+def test_a_recipe_that_repeats_a_stage_is_cut_in_order_too():
+    easy, hard = Stage(name="a", iterations=2), Stage(name="b", iterations=3)
+    recipe = replace(TINY, stages=(easy, hard, easy)).with_iterations(6)
+    assert [(s.name, s.iterations) for s in recipe.stages] == [("a", 2), ("b", 3), ("a", 1)]
+
+
+def test_no_iterations_are_too_few():
+    with pytest.raises(GaitshiftError, match="0 iterations: at least 1"):
+        ABC.with_iterations(0)
+
+
+def test_the_swing_height_grows_in_a_straight_line():
+    recipe = replace(TINY, swing_from=10, swing_until=30)
+    table = {0: 0.0, 10: 0.0, 15: 0.25, 20: 0.5, 30: 1.0, 31: 1.0, 1000: 1.0}
+    assert {iteration: recipe.swing_scale(iteration) for iteration in table} == table
+    at_once = replace(TINY, swing_from=0, swing_until=0)
+    assert at_once.swing_scale(0) == 1.0
+
+
+# Grounds ----------------------------------------------------------------------------------------
+
+
+def test_each_iteration_has_its_stage_and_its_number_within_it():
+    table = {0: ("a", 0), 2: ("a", 2), 3: ("b", 0), 6: ("b", 3), 7: ("c", 0), 11: ("c", 4)}
+    told = {i: (stage.name, within) for i in table for stage, within in [stage_at(ABC, i)]}
+    assert told == table
+    stage, within = stage_at(ABC, 15)
+    assert (stage.name, within) == ("c", 8), "beyond the end the last stage goes on"
+
+
+def test_the_same_numbers_give_the_same_ground_and_others_another():
+    stage = Stage(name="rough", iterations=40, amplitude=0.1)
+
+    def drawn(within, seed):
+        return draw_ground(stage, within, seed).height
+
+    np.testing.assert_array_equal(drawn(5, 1), drawn(5, 1))
+    assert not np.array_equal(drawn(5, 1), drawn(10, 1))
+    assert not np.array_equal(drawn(5, 1), drawn(5, 2))
+
+
+@pytest.mark.parametrize("amplitude", [0.005, 0.15])
+def test_no_ground_is_higher_than_its_stage_says_and_late_ones_come_near_it(amplitude):
+    stage = Stage(name="rough", iterations=50, amplitude=amplitude)
+    highest = np.array(
+        [np.abs(draw_ground(stage, within, 0).height).max() for within in range(0, 50, 2)]
+    )
+    assert highest.max() <= amplitude * (1 + 1e-9)
+    assert highest[13:].max() > 0.8 * amplitude
+    assert highest[:3].max() < highest[13:].max()
+
+
+def test_a_stage_without_amplitude_is_level():
+    assert draw_ground(Stage(name="flat", iterations=5), 3, 0).is_flat
+
+
+# A run and its folder ---------------------------------------------------------------------------
+
+
+def test_a_run_reports_every_iteration_and_writes_it_down(whole):
+    run, reported = whole
+    written = rows(run.folder)
+    assert [row["iteration"] for row in reported] == [1, 2, 3, 4, 5, 6]
+    assert [row["stage"] for row in reported] == ["flat"] * 3 + ["rough"] * 3
+    assert [row["steps"] for row in reported] == [32, 64, 96, 128, 160, 192]
+    assert [row["wall_s"] for row in reported] == sorted(row["wall_s"] for row in reported)
+    told = [{k: str(v) for k, v in row.items() if k != "wall_s"} for row in reported]
+    assert written == told
+
+
+def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(whole):
+    run, reported = whole
+    figures = {"iteration", "stage", "steps", "wall_s", "reward", "speed", "changes_per_s"}
+    figures |= {"stance_fraction", "survival", "value_loss", "action_std", "learning_rate"}
+    terms = {"forward_velocity", "lateral_velocity", "roll_pitch_rate", "yaw_rate", "torque"}
+    terms |= {"joint_position", "joint_velocity", "stance_pattern", "slip", "action_rate"}
+    assert set(reported[0]) == figures | {f"reward/{name}" for name in terms}
+    for row in reported:
+        assert all(np.isfinite(value) for name, value in row.items() if name != "stage")
+        bonus = row["changes_per_s"] / 100 * run.recipe.env.reward.bonus
+        walk = sum(row[f"reward/{name}"] for name in terms)
+        assert row["reward"] == pytest.approx(walk + bonus, abs=1e-3)
+
+
+def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
+    run, _ = whole
+    world = run.learner.env.world
+    np.testing.assert_array_equal(
+        world.terrains[0].height, draw_ground(TINY.stages[1], 2, run.seed).height
+    )
+    assert run.learner.env.config.push.force == 100.0
+    assert run.learner.env.swing_scale == 1.0
+
+
+def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(whole):
+    run, _ = whole
+    loaded = policy.load(run.folder / "policy.onnx")
+    assert loaded.gait == "trot"
+    training = loaded.info.training
+    assert (training["seed"], training["iterations"], training["steps"]) == (7, 6, 192)
+    assert training["command"] == "gaitshift train trot"
+    size = loaded.observation.size
+    seen = np.random.default_rng(0).normal(size=(3, size)).astype(np.float32)
+    with torch.no_grad():
+        actor = run.learner.ppo.actor
+        expected = actor(TensorDict({"policy": torch.from_numpy(seen)}, batch_size=[3])).numpy()
+    np.testing.assert_allclose(loaded(seen), expected, atol=1e-5)
+
+
+def test_the_config_is_read_back_into_the_same_recipe_and_machine(whole):
+    run, _ = whole
+    config = json.loads((run.folder / "config.json").read_text())
+    assert recipe_from_dict(config["recipe"]) == TINY
+    assert RewardMachine.from_dict(config["machine"]) == TROT
+    assert (config["seed"], config["command"]) == (7, "gaitshift train trot")
+    assert config["versions"]["torch"] == torch.__version__.partition("+")[0] or torch.__version__
+
+
+def test_every_preset_and_every_field_survives_the_config_file(tmp_path):
+    unusual = replace(
+        TINY,
+        env=EnvConfig(
+            reward=RewardConfig(slip=-9.0, bonus=50.0, bonus_mode="multiply_clipped"),
+            push=PushConfig(force=11.0, duration=3, interval=17, vertical=0.9),
+            observed=("contact", "machine_state"),
+            gains="paper",
+            forward_speed=0.4,
+        ),
+        ppo=PpoConfig(hidden=(5,), mirror=False, clip_values=True, reward_scale=3.0),
+    )
+    for number, recipe in enumerate([unusual, *(preset() for preset in PRESETS.values())]):
+        recipe = replace(recipe, robots=2)
+        folder = tmp_path / str(number)
+        create(folder, recipe=recipe)
+        config = json.loads((folder / "config.json").read_text())
+        assert recipe_from_dict(config["recipe"]) == recipe
+
+
+# Breaking off and going on ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("iteration", [3, 5])
+def test_a_run_that_was_killed_and_goes_on_ends_with_the_same_bits(tmp_path, whole, iteration):
+    unbroken, _ = whole
+    folder = tmp_path / "broken"
+    with pytest.raises(KilledError):
+        create(folder).train(kill_at(iteration))
+    run = Run.resume(folder)
+    assert run.iteration == iteration - 1
+    run.train()
+    assert same_bits(weights(run), weights(unbroken))
+    assert rows(folder) == rows(unbroken.folder)
+    np.testing.assert_array_equal(initializers(folder), initializers(unbroken.folder))
+
+
+def initializers(folder):
+    """All numbers of a policy's network."""
+    graph = onnx.load(folder / "policy.onnx").graph
+    return np.concatenate([onnx.numpy_helper.to_array(part).ravel() for part in graph.initializer])
+
+
+def test_a_run_that_was_killed_twice_at_other_steps_ends_with_the_same_bits(tmp_path, whole):
+    folder = tmp_path / "broken"
+    with pytest.raises(KilledError):
+        create(folder).train(kill_at(1))
+    with pytest.raises(KilledError):
+        Run.resume(folder).train(kill_at(4))
+    # The process died while it wrote a line.
+    with (folder / "progress.csv").open("a") as file:
+        file.write("5,rough,16")
+    run = Run.resume(folder)
+    run.train()
+    assert same_bits(weights(run), weights(whole[0]))
+    assert rows(folder) == rows(whole[0].folder)
+
+
+def test_an_interrupted_run_leaves_the_policy_as_it_stands(tmp_path):
+    folder = tmp_path / "run"
+    with pytest.raises(KeyboardInterrupt):
+        create(folder).train(kill_at(3, KeyboardInterrupt))
+    assert policy.load(folder / "policy.onnx").info.training["iterations"] == 3
+
+
+def test_a_finished_run_that_goes_on_changes_nothing(tmp_path, whole):
+    folder = tmp_path / "copy"
+    shutil.copytree(whole[0].folder, folder)
+    run = Run.resume(folder)
+    run.train()
+    assert same_bits(weights(run), weights(whole[0]))
+    assert rows(folder) == rows(whole[0].folder)
+
+
+def test_the_same_seed_gives_the_same_weights_and_another_seed_others(tmp_path, whole):
+    same, other = create(tmp_path / "same"), create(tmp_path / "other", seed=8)
+    assert not same_bits(weights(same), weights(other)), "seeds differ from the first weights on"
+    same.train()
+    other.train()
+    assert same_bits(weights(same), weights(whole[0]))
+    assert rows(same.folder) == rows(whole[0].folder)
+    assert rows(other.folder) != rows(whole[0].folder)
+
+
+# Folders that are refused -----------------------------------------------------------------------
+
+
+def test_an_empty_folder_is_taken(tmp_path):
+    create(tmp_path)
+    assert (tmp_path / "config.json").is_file()
+
+
+def test_a_folder_with_something_in_it_is_refused_and_left_alone(tmp_path):
+    (tmp_path / "thesis.txt").write_text("years of work")
+    with pytest.raises(GaitshiftError, match="not empty; give another --out, --overwrite"):
+        create(tmp_path)
+    with pytest.raises(GaitshiftError, match="not a training run, so it is not overwritten"):
+        create(tmp_path, overwrite=True)
+    assert [file.name for file in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_file_in_the_place_of_the_folder_is_refused_and_left_alone(tmp_path, overwrite):
+    file = tmp_path / "run"
+    file.write_text("years of work")
+    with pytest.raises(GaitshiftError, match=str(file)):
+        create(file, overwrite=overwrite)
+    assert file.read_text() == "years of work"
+
+
+def test_overwriting_an_earlier_run_leaves_nothing_of_it(tmp_path, whole):
+    folder = tmp_path / "run"
+    shutil.copytree(whole[0].folder, folder)
+    with pytest.raises(GaitshiftError, match="--resume"):
+        create(folder)
+    create(folder, seed=9, overwrite=True)
+    assert [file.name for file in (folder / "checkpoints").iterdir()] == ["000000.pt"]
+    assert sorted(file.name for file in folder.iterdir()) == ["checkpoints", "config.json"]
+    assert Run.resume(folder).iteration == 0
+
+
+def refusal(folder):
+    """The one line with which a folder is refused."""
+    with pytest.raises(GaitshiftError) as caught:
+        Run.resume(folder)
+    line = str(caught.value)
+    assert "\n" not in line
+    assert str(folder) in line
+    return line
+
+
+@pytest.fixture
+def copied(tmp_path, whole):
+    """A folder of a run, to be damaged."""
+    return shutil.copytree(whole[0].folder, tmp_path / "run")
+
+
+def test_a_folder_that_is_no_run_cannot_go_on(tmp_path):
+    assert "not a training run: it has no config.json" in refusal(tmp_path)
+    assert "not a training run" in refusal(tmp_path / "nowhere")
+
+
+def damage_whole(config):
+    return config[: len(config) // 2]
+
+
+def damage_key(config):
+    return config.replace(b'"recipe"', b'"receipt"')
+
+
+def damage_field(config):
+    return config.replace(b'"robots"', b'"robotsandmore"')
+
+
+def damage_bytes(config):
+    return b"\xff\xfe\x00" + config
+
+
+def damage_shape(config):
+    return b"[1, 2, 3]"
+
+
+@pytest.mark.parametrize(
+    "damage", [damage_whole, damage_key, damage_field, damage_bytes, damage_shape]
+)
+def test_a_damaged_config_is_named(copied, damage):
+    file = copied / "config.json"
+    file.write_bytes(damage(file.read_bytes()))
+    assert "config.json is damaged" in refusal(copied)
+
+
+def test_a_config_whose_machine_breaks_the_laws_is_named(copied):
+    file = copied / "config.json"
+    config = json.loads(file.read_text())
+    config["machine"]["transition"][0]["to"] = "nowhere"
+    file.write_text(json.dumps(config))
+    assert "nowhere" in refusal(copied)
+
+
+def test_a_damaged_checkpoint_is_named_and_without_it_the_run_goes_on_from_the_one_before(
+    copied, whole
+):
+    last = copied / "checkpoints" / "000006.pt"
+    last.write_bytes(last.read_bytes()[:2000])
+    assert "000006.pt is damaged; remove it" in refusal(copied)
+    last.unlink()
+    run = Run.resume(copied)
+    assert run.iteration == 4
+    run.train()
+    assert same_bits(weights(run), weights(whole[0]))
+    assert rows(copied) == rows(whole[0].folder)
+
+
+def test_a_run_without_checkpoints_cannot_go_on(copied):
+    shutil.rmtree(copied / "checkpoints")
+    assert "no checkpoint" in refusal(copied)
+
+
+# Values with a closed form ----------------------------------------------------------------------
+
+DISCOUNT = 0.9
+ORACLE = Recipe(
+    env=EnvConfig(observed=("contact",)),
+    ppo=PpoConfig(
+        hidden=(32,),
+        discount=DISCOUNT,
+        epochs=4,
+        mini_batches=2,
+        learning_rate=5e-3,
+        desired_kl=0.0,
+        reward_scale=1.0,
+        mirror=False,
+    ),
+    robots=32,
+    steps=16,
+    threads=1,
+)
+
+
+def learned_values(env, recipe, observations, *, iterations):
+    """V of the observations, as the critic has it after some iterations."""
+    torch.set_num_threads(1)
+    torch.manual_seed(0)
+    learner = Learner(env, recipe)
+    for _ in range(iterations):
+        learner.iterate()
+    with torch.no_grad():
+        seen = torch.tensor(observations, dtype=torch.float32)
+        return learner.ppo.critic(TensorDict({"policy": seen}, batch_size=[len(seen)])).squeeze(1)
+
+
+class EveryStepIsWorthOne(GaitEnv):
+    """The true environment, with another reward."""
+
+    def step(self, actions):
+        observation, reward, terminated, truncated, info = super().step(actions)
+        self.ends = (terminated, truncated)
+        return observation, np.ones_like(reward), terminated, truncated, info
+
+
+def test_a_reward_of_one_for_ever_is_worth_its_geometric_sum_though_episodes_are_cut_short():
+    # 1 + γ + γ² + … = 1 / (1 - γ) = 10; five steps alone would be worth at most 4.1.
+    recipe = replace(ORACLE, env=EnvConfig(episode_steps=5), robots=16)
+    env = EveryStepIsWorthOne(TROT, flat(20.0, 20.0), 16, config=recipe.env, threads=1)
+    torch.manual_seed(0)
+    learner = Learner(env, recipe)
+    cuts, values = 0, []
+    for iteration in range(60):
+        learner.iterate()
+        cuts += int(env.ends[1].sum())
+        assert not env.ends[0].any()
+        if iteration >= 55:
+            with torch.no_grad():
+                values += learner.ppo.critic(learner._observation).squeeze(1).tolist()
+    assert cuts > 0
+    assert np.mean(values) == pytest.approx(10.0, rel=0.1)
+
+
+class Toss(GaitEnv):
+    """Noise to look at, a reward of 1 a step, and an end by the toss of a coin."""
+
+    chance = 0.25
+
+    def __init__(self):
+        super().__init__(TROT, flat(20.0, 20.0), 32, config=ORACLE.env, threads=1)
+        self.rng = np.random.default_rng(0)
+
+    def step(self, actions):
+        ended = self.rng.random(32) < self.chance
+        none = np.zeros(32, dtype=bool)
+        info = {"reward_terms": {}, "changed": none, "shows_stance": none}
+        info |= {"forward_speed": np.zeros(32), "final_obs": self.noise(), "_final_obs": ended}
+        return self.noise(), np.ones(32), ended, none, info
+
+    def noise(self):
+        return self.rng.normal(size=(32, 4)).astype(np.float32)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.5])
+def test_nothing_is_earned_after_a_fall(scale):
+    # V = 1 + γ (1 - p) V, so V = 1 / (1 - 0.9 · 0.75) = 3.077; the scale is PPO's alone.
+    recipe = replace(ORACLE, ppo=replace(ORACLE.ppo, reward_scale=scale))
+    seen = np.random.default_rng(1).normal(size=(400, 4))
+    values = learned_values(Toss(), recipe, seen, iterations=60)
+    assert values.mean().item() == pytest.approx(scale * 3.077, rel=0.1)
+
+
+class Entrance(GaitEnv):
+    """Two places: an episode begins in A, whose step costs 10, and stays in B, worth 1 a step.
+
+    In B episodes are cut by the toss of a coin; they end in B, and the next begins in A.
+    """
+
+    a, b = np.eye(4, dtype=np.float32)[:2]
+
+    def __init__(self):
+        super().__init__(TROT, flat(20.0, 20.0), 32, config=ORACLE.env, threads=1)
+        self.rng = np.random.default_rng(0)
+        self.in_b = np.zeros(32, dtype=bool)
+
+    def reset(self, **_):
+        self.in_b[:] = False
+        return self.look(), {}
+
+    def look(self):
+        return np.where(self.in_b[:, None], self.b, self.a)
+
+    def step(self, actions):
+        reward = np.where(self.in_b, 1.0, -10.0)
+        cut = self.in_b & (self.rng.random(32) < 0.3)
+        self.in_b = np.ones(32, dtype=bool)
+        final = self.look()
+        self.in_b = ~cut
+        none = np.zeros(32, dtype=bool)
+        info = {"reward_terms": {}, "changed": none, "shows_stance": none}
+        info |= {"forward_speed": np.zeros(32), "final_obs": final, "_final_obs": cut}
+        return self.look(), reward, none, cut, info
+
+
+def test_a_cut_episode_is_worth_what_its_true_last_observation_is_worth():
+    # V(B) = 1 / (1 - γ) = 10 and V(A) = -10 + γ V(B) = -1, as if nothing were cut. Valued by the
+    # first observation of the next episode, B would lose: V(B) = 1 + γ (0.7 V(B) + 0.3 V(A)).
+    recipe = replace(ORACLE, ppo=replace(ORACLE.ppo, normalize_observations=False))
+    a, b = learned_values(Entrance(), recipe, [Entrance.a, Entrance.b], iterations=100)
+    assert b.item() == pytest.approx(10.0, rel=0.1)
+    assert a.item() == pytest.approx(-1.0, abs=1.0)
+
+
+# The mirror -------------------------------------------------------------------------------------
+
+SEEN = ("machine_state", "contact", "base_linear_velocity_b", "yaw_rate_command", "joint_position")
+
+
+def learner_of(machine, *, mirror):
+    config = EnvConfig(observed=SEEN)
+    env = GaitEnv(machine, flat(20.0, 20.0), 2, config=config, threads=1)
+    ppo = PpoConfig(hidden=(8,), mirror=mirror)
+    return Learner(env, replace(TINY, env=config, ppo=ppo, robots=2, steps=4))
+
+
+@pytest.mark.parametrize(("gait", "states"), [("trot", [0.0, 1.0]), ("bound", [1.0, 0.0])])
+def test_each_batch_is_followed_by_its_mirror_image(gait, states):
+    symmetry = learner_of(gaits.load(gait), mirror=True).ppo.symmetry
+    assert symmetry.use_data_augmentation
+    # In the first state, on FL and BL, drifting left and turning right, joints 1 … 12 tenths.
+    joints = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]
+    mirrored_joints = [-0.4, 0.5, 0.6, -0.1, 0.2, 0.3, -1.0, 1.1, 1.2, -0.7, 0.8, 0.9]
+    seen = torch.tensor([[1.0, 0, 1, 0, 1, 0, 1.2, 0.3, -0.1, -0.4, *joints], [0.0] * 22])
+    image = torch.tensor([*states, 0, 1, 0, 1, 1.2, -0.3, -0.1, 0.4, *mirrored_joints])
+    obs, actions = symmetry.data_augmentation_func(
+        env=None,
+        obs=TensorDict({"policy": seen}, batch_size=[2]),
+        actions=torch.tensor([joints, [0.0] * 12]),
+    )
+    assert obs.batch_size == torch.Size([4])
+    torch.testing.assert_close(obs["policy"][:2], seen)
+    torch.testing.assert_close(obs["policy"][2], image)
+    torch.testing.assert_close(actions[0], torch.tensor(joints))
+    torch.testing.assert_close(actions[2], torch.tensor(mirrored_joints))
+    assert not obs["policy"][3].any()
+    assert actions.shape == (4, 12)
+
+
+def test_learning_from_mirror_images_keeps_a_symmetric_critic_symmetric_in_the_mean():
+    # Values of a batch and of its mirror image are drawn to the same returns.
+    learner = learner_of(TROT, mirror=True)
+    learner.iterate()
+    augmented = []
+    augment = learner.ppo.symmetry.augment_batch
+
+    def kept(batch, size):
+        augment(batch, size)
+        augmented.append((batch.returns.clone(), batch.observations["policy"].clone(), size))
+
+    learner.ppo.symmetry.augment_batch = kept
+    learner.iterate()
+    assert augmented
+    for returns, observations, size in augmented:
+        assert len(returns) == len(observations) == 2 * size
+        torch.testing.assert_close(returns[size:], returns[:size])
+
+
+def test_a_gait_with_a_leading_side_and_a_recipe_without_mirror_learn_from_what_was_seen_alone():
+    assert learner_of(TROT, mirror=False).ppo.symmetry is None
+    leading = {
+        "name": "three-beat",
+        "title": "Three beats",
+        "description": "Always the left front foot first.",
+        "dwell": 5,
+        "ideal_phase": {"FL": 0.0, "FR": 0.3, "BL": 0.6, "BR": 0.6},
+        "state": [
+            {"name": "FL", "stance": ["FL"]},
+            {"name": "FR", "stance": ["FR"]},
+            {"name": "hind", "stance": ["BL", "BR"]},
+        ],
+        "transition": [
+            {"from": "FL", "to": "FR", "down": ["FR"], "up": ["FL"]},
+            {"from": "FR", "to": "hind", "down": ["BL", "BR"], "up": ["FR"]},
+            {"from": "hind", "to": "FL", "down": ["FL"], "up": ["BL", "BR"]},
+        ],
+    }
+    machine = RewardMachine.from_dict(leading)
+    assert machine.mirrored_states() is None
+    assert learner_of(machine, mirror=True).ppo.symmetry is None
+
+
+# A true training, if a short one ----------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_thirty_iterations_are_enough_to_set_off(tmp_path):
+    recipe = Recipe(
+        env=EnvConfig(),
+        ppo=PpoConfig(hidden=(128, 64), initial_std=0.5, learning_rate=1e-3),
+        stages=(Stage(name="flat", iterations=30),),
+        robots=64,
+        steps=24,
+        swing_from=1000,
+        swing_until=1001,
+        threads=1,
+    )
+    reported = []
+    create(tmp_path / "run", seed=0, recipe=recipe).train(reported.append)
+    early, late = reported[:3], reported[-5:]
+
+    def mean(some, name):
+        return np.mean([row[name] for row in some])
+
+    assert abs(mean(early, "speed")) < 0.1
+    assert mean(late, "speed") > 0.15
+    assert mean(late, "reward") > mean(early, "reward") + 2
+    assert mean(late, "changes_per_s") > 2 * mean(early, "changes_per_s")
