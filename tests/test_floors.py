@@ -23,7 +23,17 @@ ON_A_ROBOT = (
 )
 """Modules that go onto a robot, where NumPy, onnxruntime and jaxtyping are all there is."""
 
-HEAVY = ("mujoco", "torch", "gymnasium", "matplotlib", "scipy", "tyro", "rich", "imageio_ffmpeg", "PIL")
+HEAVY = (
+    "mujoco",
+    "torch",
+    "gymnasium",
+    "matplotlib",
+    "scipy",
+    "tyro",
+    "rich",
+    "imageio_ffmpeg",
+    "PIL",
+)
 TORCH = ("torch", "tensordict", "rsl_rl", "onnx", "tensorboard")
 
 

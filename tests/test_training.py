@@ -204,11 +204,11 @@ def test_the_same_numbers_give_the_same_ground_and_others_another():
 def test_no_ground_is_higher_than_its_stage_says_and_late_ones_come_near_it(amplitude):
     stage = Stage(name="rough", iterations=50, amplitude=amplitude)
     highest = np.array(
-        [np.abs(draw_ground(stage, within, 0).height).max() for within in range(0, 50, 2)]
+        [np.abs(draw_ground(stage, within, 0).height).max() for within in range(0, 50, 4)]
     )
     assert highest.max() <= amplitude * (1 + 1e-9)
-    assert highest[13:].max() > 0.8 * amplitude
-    assert highest[:3].max() < highest[13:].max()
+    assert highest[7:].max() > 0.8 * amplitude
+    assert highest[:2].max() < highest[7:].max()
 
 
 def test_a_stage_without_amplitude_is_level():
@@ -274,7 +274,7 @@ def test_the_config_is_read_back_into_the_same_recipe_and_machine(whole):
     assert recipe_from_dict(config["recipe"]) == TINY
     assert RewardMachine.from_dict(config["machine"]) == TROT
     assert (config["seed"], config["command"]) == (7, "gaitshift train trot")
-    assert config["versions"]["torch"] == torch.__version__.partition("+")[0] or torch.__version__
+    assert {"python", "numpy", "torch", "mujoco-core"} <= set(config["versions"])
 
 
 def test_every_preset_and_every_field_survives_the_config_file(tmp_path):
@@ -352,13 +352,15 @@ def test_a_finished_run_that_goes_on_changes_nothing(tmp_path, whole):
 
 
 def test_the_same_seed_gives_the_same_weights_and_another_seed_others(tmp_path, whole):
-    same, other = create(tmp_path / "same"), create(tmp_path / "other", seed=8)
-    assert not same_bits(weights(same), weights(other)), "seeds differ from the first weights on"
+    same = create(tmp_path / "same")
+    first = weights(same)
     same.train()
-    other.train()
     assert same_bits(weights(same), weights(whole[0]))
     assert rows(same.folder) == rows(whole[0].folder)
-    assert rows(other.folder) != rows(whole[0].folder)
+    other = create(tmp_path / "other", seed=8)
+    assert not same_bits(weights(other), first), "seeds differ from the first weights on"
+    other.train()
+    assert rows(other.folder)[0]["reward"] != rows(whole[0].folder)[0]["reward"]
 
 
 # Folders that are refused -----------------------------------------------------------------------
@@ -503,36 +505,33 @@ def learned_values(env, recipe, observations, *, iterations):
     learner = Learner(env, recipe)
     for _ in range(iterations):
         learner.iterate()
+    seen = torch.from_numpy(np.asarray(observations, dtype=np.float32))
     with torch.no_grad():
-        seen = torch.tensor(observations, dtype=torch.float32)
         return learner.ppo.critic(TensorDict({"policy": seen}, batch_size=[len(seen)])).squeeze(1)
 
 
 class EveryStepIsWorthOne(GaitEnv):
-    """The true environment, with another reward."""
+    """The true environment with another reward."""
+
+    falls = cuts = 0
 
     def step(self, actions):
         observation, reward, terminated, truncated, info = super().step(actions)
-        self.ends = (terminated, truncated)
+        self.falls += int(terminated.sum())
+        self.cuts += int(truncated.sum())
         return observation, np.ones_like(reward), terminated, truncated, info
 
 
 def test_a_reward_of_one_for_ever_is_worth_its_geometric_sum_though_episodes_are_cut_short():
     # 1 + γ + γ² + … = 1 / (1 - γ) = 10; five steps alone would be worth at most 4.1.
-    recipe = replace(ORACLE, env=EnvConfig(episode_steps=5), robots=16)
-    env = EveryStepIsWorthOne(TROT, flat(20.0, 20.0), 16, config=recipe.env, threads=1)
-    torch.manual_seed(0)
-    learner = Learner(env, recipe)
-    cuts, values = 0, []
-    for iteration in range(60):
-        learner.iterate()
-        cuts += int(env.ends[1].sum())
-        assert not env.ends[0].any()
-        if iteration >= 55:
-            with torch.no_grad():
-                values += learner.ppo.critic(learner._observation).squeeze(1).tolist()
-    assert cuts > 0
-    assert np.mean(values) == pytest.approx(10.0, rel=0.1)
+    # Only the action is shown: the critic must not tell by the observation that an episode is over.
+    config = EnvConfig(observed=("last_action",), episode_steps=5)
+    recipe = replace(ORACLE, env=config, robots=16)
+    env = EveryStepIsWorthOne(TROT, flat(20.0, 20.0), 16, config=config, threads=1)
+    seen = 0.5 * np.random.default_rng(0).normal(size=(400, 12))
+    values = learned_values(env, recipe, seen, iterations=60)
+    assert (env.falls, env.cuts) == (0, 16 * 60 * 16 // 5)
+    assert values.mean().item() == pytest.approx(10.0, rel=0.1)
 
 
 class Toss(GaitEnv):
@@ -640,8 +639,7 @@ def test_each_batch_is_followed_by_its_mirror_image(gait, states):
     assert actions.shape == (4, 12)
 
 
-def test_learning_from_mirror_images_keeps_a_symmetric_critic_symmetric_in_the_mean():
-    # Values of a batch and of its mirror image are drawn to the same returns.
+def test_an_observation_and_its_mirror_image_are_drawn_to_the_same_return():
     learner = learner_of(TROT, mirror=True)
     learner.iterate()
     augmented = []

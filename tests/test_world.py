@@ -204,19 +204,23 @@ def test_a_standing_robot_stays_where_it_stands():
 
 
 def test_contact_tells_the_lifted_foot_from_the_others():
-    """Robot i draws up leg i: a tenth of a second later that foot alone is in the air."""
+    """Robot i draws up leg i: 0.09 s later that foot alone is in the air.
+
+    On level ground at 0 the height above the lowest foot is then still that of the base.
+    """
     world = robots(4, xy=np.zeros((4, 2)))
     assert stand(world, 100).contact.all()
     target = np.tile(STANCE, (4, 1)).reshape(4, 4, 3)
     for leg in range(4):
-        target[leg, leg] += np.array([0.0, 0.6, -1.2]) * np.sign(STANCE[3 * leg + 1])
-    for _ in range(15):
+        target[leg, leg] += np.array([0.0, 0.4, -0.8]) * np.sign(STANCE[3 * leg + 1])
+    for _ in range(9):
         motion = world.step(target.reshape(4, 12))
     lifted = np.eye(4, dtype=bool)
     np.testing.assert_array_equal(motion.contact, ~lifted)
     np.testing.assert_array_equal(motion.foot_force > 10.0, ~lifted)
-    np.testing.assert_array_equal(motion.clearance > 0.1, lifted)
+    np.testing.assert_array_equal(motion.clearance > 0.05, lifted)
     np.testing.assert_array_equal(motion.clearance < 0.01, ~lifted)
+    np.testing.assert_allclose(motion.base_height, motion.base_position_w[:, 2], atol=0.015)
 
 
 def test_body_contact_holds_on_the_belly_and_not_on_the_feet():
@@ -232,10 +236,10 @@ def test_body_contact_holds_on_the_belly_and_not_on_the_feet():
 
 @pytest.mark.parametrize("degrees", [-7.0, 6.0])
 def test_feet_on_a_ramp_stand_on_the_plane_of_its_slope(degrees):
-    """The ground under a foot is tan(slope)·x.
+    """The ground under a foot is tan(slope)·x, and feet in contact are within 3 mm of it.
 
-    A ball of radius r that touches a slope has its lowest point r·(1/cos - 1) above the ground
-    straight below.
+    A ball that touches a slope has its lowest point r·(1/cos - 1) above it, here at most 0.2 mm;
+    the rest is how deep feet sink in.
     """
     angle = np.radians(degrees)
     ramp = slope(degrees, length=6.0, width=6.0).moved(-3.0, 0.0)
@@ -245,8 +249,7 @@ def test_feet_on_a_ramp_stand_on_the_plane_of_its_slope(degrees):
     ground = np.tan(angle) * (foot[..., 0] + 3.0)
     np.testing.assert_allclose(motion.clearance, foot[..., 2] - ground, rtol=0, atol=1e-12)
     assert motion.contact.all()
-    touching = ANYMAL_B.foot_radius * (1 / np.cos(angle) - 1)
-    np.testing.assert_allclose(motion.clearance, touching, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(motion.clearance, 0.0, rtol=0, atol=3e-3)
 
 
 # Motion: frames, freshness, ownership
@@ -494,6 +497,7 @@ def test_placing_a_robot_leaves_the_others_alone():
     world, twin = (robots(4) for _ in range(2))
     targets = wild_targets(4, 10)
     for each in (world, twin):
+        each.push(np.full((4, 3), 30.0))
         run(each, targets[:5])
     ids = np.array([1, 3])
     world.place(ids, xy=np.array([(5.0, 6.0), (7.0, 8.0)]), yaw=np.array([0.4, -2.0]))
@@ -562,4 +566,4 @@ def test_new_ground_carries_robots_where_it_lies():
     motion = stand(world, 100)
     height = np.tan(np.radians(8.0)) * (motion.foot_position_w[..., 0] + 5.0)
     assert motion.contact.all()
-    np.testing.assert_allclose(motion.foot_position_w[..., 2], height, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(motion.foot_position_w[..., 2], height, rtol=0, atol=3e-3)

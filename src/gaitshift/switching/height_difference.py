@@ -58,20 +58,21 @@ class HeightDifference:
     α may change between steps (III-E): go on with the same state and a replaced config.
     """
 
-    alpha: float = 0.05
-    """α [m], |h_i − h_j| above it counts as rough; paper 0.2, ours: less shows in this frame."""
+    alpha: float = 0.04
+    """α [m], |h_i − h_j| above it counts as rough; paper 0.2, ours: twice what trot shows on flat."""
 
-    beta: float = 120.0
-    """β [counts], fire when k exceeds it; paper 1000, ours: 0.2 s of all six pairs at 100 Hz."""
+    beta: float = 200.0
+    """β [counts], fire when k exceeds it; paper 1000, ours: some 1.2 s of `perlin:0.10`."""
 
     epsilon: float = 1.0
     """ε [counts], increment of k (paper III-E: one, or in general some small number)."""
 
-    alpha_back: float = 0.03
-    """α' [m], all |h_i − h_j| below it count as flat; ours: under α, so no step counts as both."""
+    alpha_back: float = 0.035
+    """α' [m], all |h_i − h_j| below it count as flat; ours: 98 % of bound's steps on flat ground."""
 
-    beta_back: float = 150.0
-    """β' [counts], fire back when k exceeds it; ours: 1.5 s of flat steps at 100 Hz."""
+    beta_back: float = 300.0
+    """β' [counts], fire back when k exceeds it; ours: 3 s of flat steps, twice what 10 m of
+    `perlin:0.10` count."""
 
     frame: Literal["body", "gravity"] = "gravity"
     """Frame of h, body (paper III-E) or gravity; ours: the body frame takes pitch for terrain."""

@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import mujoco
 import numpy as np
@@ -107,7 +107,7 @@ class Canvas:
         return np.ascontiguousarray(self._pixels[::-1])
 
     def _add(self, ball: Ball) -> None:
-        geom = self._scene.geoms[self._scene.ngeom]
+        geom = cast("mujoco.MjvGeom", self._scene.geoms[self._scene.ngeom])
         mujoco.mjv_initGeom(
             geom,
             mujoco.mjtGeom.mjGEOM_SPHERE,

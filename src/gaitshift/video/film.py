@@ -3,6 +3,7 @@
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, cast
 
 import imageio_ffmpeg
 import numpy as np
@@ -21,7 +22,7 @@ _RATE = 950
 class FilmWriter:
     """Writes pictures of one size into an MP4 file, whole or not at all; a context manager."""
 
-    def __init__(self, path: Path, width: int, height: int, fps: float) -> None:
+    def __init__(self, path: Path, width: int, height: int, fps: int) -> None:
         self._path, self._part = path, path.with_suffix(".part.mp4")
         try:
             self._frames = imageio_ffmpeg.write_frames(
@@ -31,7 +32,7 @@ class FilmWriter:
                 codec="libx264",
                 pix_fmt_out="yuv420p",
                 macro_block_size=2,
-                quality=None,
+                quality=cast(Any, None),
                 output_params=[
                     *("-preset", "veryfast", "-crf", str(_QUALITY), "-movflags", "+faststart"),
                     *("-maxrate", f"{_RATE}k", "-bufsize", f"{2 * _RATE}k"),

@@ -35,7 +35,7 @@ def render(
     *,
     width: int = 1280,
     height: int = 720,
-    fps: float = 30.0,
+    fps: int = 30,
     t0: float = 0.0,
     t1: float = float("inf"),
     report: Callable[[int, int], None] = lambda done, total: None,
@@ -70,7 +70,7 @@ def render(
             report(done + 1, len(entries))
 
 
-def _check_target(path: Path, width: int, height: int, fps: float) -> None:
+def _check_target(path: Path, width: int, height: int, fps: int) -> None:
     if path.suffix.lower() != ".mp4":
         raise GaitshiftError(f"{path}: the name of a video ends in .mp4")
     if not path.parent.is_dir():
@@ -80,10 +80,10 @@ def _check_target(path: Path, width: int, height: int, fps: float) -> None:
             f"a video of {width} × {height} pixels: even numbers from {_SMALLEST} up would be right"
         )
     if not 1 <= fps <= 120:
-        raise GaitshiftError(f"{fps:g} pictures a second: 1 to 120 would be right")
+        raise GaitshiftError(f"{fps} pictures a second: 1 to 120 would be right")
 
 
-def _entries(log: Log, fps: float) -> list[int]:
+def _entries(log: Log, fps: int) -> list[int]:
     """The entry that each picture shows."""
     times = np.arange(log.time[0], log.time[-1] + 1e-9, 1 / fps)
     return np.searchsorted(log.time, times - 1e-9).tolist()

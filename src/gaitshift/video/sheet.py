@@ -30,7 +30,8 @@ def contact_sheet(
     ]
     if not small:
         raise GaitshiftError("no pictures to put on a sheet")
-    chosen = [small[i] for i in np.linspace(0, len(small) - 1, count).round().astype(int)]
+    places = np.linspace(0, len(small) - 1, count).round().astype(int).tolist()
+    chosen = [small[int(place)] for place in places]
     width, height = chosen[0].width + _GAP, chosen[0].height + _GAP
     columns = min(_COLUMNS, count)
     rows = -(-count // columns)

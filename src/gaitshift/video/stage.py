@@ -66,7 +66,7 @@ def build_stage(
         nrow=field.data.shape[0],
         ncol=field.data.shape[1],
         size=field.size,
-        userdata=field.data.ravel(),
+        userdata=field.data.ravel().tolist(),
     )
     spec.worldbody.add_geom(
         name=GROUND,
@@ -87,9 +87,10 @@ def _set_look(spec: mujoco.MjSpec, width: int, height: int) -> None:
     look.quality.offsamples = 0
     look.map.znear, look.map.zfar = 0.05, 60.0
     look.map.fogstart, look.map.fogend = _FOG
-    look.rgba.fog = [*_HORIZON, 1.0]
-    look.headlight.ambient, look.headlight.diffuse = [0.42] * 3, [0.30] * 3
-    look.headlight.specular = [0.05] * 3
+    look.rgba.fog = np.array([*_HORIZON, 1.0], dtype=np.float32)
+    look.headlight.ambient = np.full(3, 0.42, dtype=np.float32)
+    look.headlight.diffuse = np.full(3, 0.30, dtype=np.float32)
+    look.headlight.specular = np.full(3, 0.05, dtype=np.float32)
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
