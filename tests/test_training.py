@@ -685,7 +685,7 @@ def test_a_gait_with_a_leading_side_and_a_recipe_without_mirror_learn_from_what_
 
 
 @pytest.mark.slow
-def test_thirty_iterations_are_enough_to_set_off(tmp_path):
+def test_thirty_iterations_are_enough_to_find_the_cycle_of_a_gait(tmp_path):
     recipe = Recipe(
         env=EnvConfig(),
         ppo=PpoConfig(hidden=(128, 64), initial_std=0.5, learning_rate=1e-3),
@@ -698,12 +698,12 @@ def test_thirty_iterations_are_enough_to_set_off(tmp_path):
     )
     reported = []
     create(tmp_path / "run", seed=0, recipe=recipe).train(reported.append)
-    early, late = reported[:3], reported[-5:]
 
     def mean(some, name):
         return np.mean([row[name] for row in some])
 
-    assert abs(mean(early, "speed")) < 0.1
-    assert mean(late, "speed") > 0.15
-    assert mean(late, "reward") > mean(early, "reward") + 2
-    assert mean(late, "changes_per_s") > 2 * mean(early, "changes_per_s")
+    early, late = reported[:2], reported[-5:]
+    # A dwell of 20 steps allows 5 changes a second.
+    assert mean(early, "changes_per_s") < 1.5
+    assert mean(late, "changes_per_s") > 3.0
+    assert mean(late, "reward") > mean(early, "reward") + 3.0

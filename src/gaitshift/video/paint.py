@@ -41,7 +41,8 @@ class Paint:
         rows, columns = model.tex_height[stage.texture], model.tex_width[stage.texture]
         start = int(model.tex_adr[stage.texture])
         texels = model.tex_data[start : start + rows * columns * 3].reshape(rows, columns, 3)
-        self._shown: UInt8[np.ndarray, "rows columns 3"] = texels
+        # MuJoCo's textures begin at the far edge; here rows run along +y, as in terrains.
+        self._shown: UInt8[np.ndarray, "rows columns 3"] = texels[::-1]
         self._terrain = terrain
         self._fine = np.array([columns / terrain.size[0], rows / terrain.size[1]])
         self._dry = self._bare_ground(rows, columns)

@@ -21,6 +21,9 @@ _HORIZON, _ZENITH = (0.93, 0.95, 0.97), (0.55, 0.68, 0.84)
 _FOG = (5.0, 13.0)
 """Where the ground begins to fade into the horizon, and where it is gone [m]."""
 
+_FOG_CELL = 0.5
+"""Distance of the samples of level ground [m]."""
+
 _REACH = 14.0
 """How far the stage goes beyond the robot's course [m]: just further than one sees."""
 
@@ -39,7 +42,7 @@ class Stage:
     terrain: Terrain
     """The part of the ground that can be seen."""
     texture: int
-    """Id of the ground's texture; its rows run along +y, its columns along +x."""
+    """Id of the ground's texture."""
 
 
 def build_stage(
@@ -115,7 +118,7 @@ def _around(terrain: Terrain, course: Float[np.ndarray, "T 2"]) -> Terrain:
     (left, back), (right, front) = course.min(axis=0) - _REACH, course.max(axis=0) + _REACH
     if terrain.is_flat:
         return Terrain(
-            height=terrain.height[:2, :2],
+            height=np.full(_fog_grid(right - left, front - back), terrain.height[0, 0]),
             size=(float(right - left), float(front - back)),
             origin=(float(left), float(back)),
             name=terrain.name,
@@ -130,6 +133,11 @@ def _around(terrain: Terrain, course: Float[np.ndarray, "T 2"]) -> Terrain:
         origin=(x0 + j0 * dx, y0 + i0 * dy),
         name=terrain.name,
     )
+
+
+def _fog_grid(length: float, width: float) -> tuple[int, int]:
+    """Rows and columns of level ground: fog is reckoned at the samples, and straight between."""
+    return int(np.ceil(width / _FOG_CELL)) + 1, int(np.ceil(length / _FOG_CELL)) + 1
 
 
 def _inside(low: float, high: float, count: int) -> tuple[int, int]:

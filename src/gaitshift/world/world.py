@@ -63,6 +63,8 @@ class World:
     def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
         """Exchanges the ground; robots go on as they moved, set down on it where they stood."""
         terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
+        if not terrains:
+            raise GaitshiftError("no terrain to stand on; give one or more")
         kept = self._kept_state(terrains) if hasattr(self, "_batch") else None
         self.terrains = terrains[: self.n]
         models = [build_model(self.robot, self._gains, ground) for ground in self.terrains]
@@ -90,7 +92,7 @@ class World:
     ) -> None:
         """Sets robots down with the base upright and the lowest foot on the ground.
 
-        Base at `xy` [m] and `yaw` [rad], at rest unless a velocity [m/s] is given; joints in the
+        `ids` are in rising order. Base at `xy` [m] and `yaw` [rad], at rest unless a velocity [m/s] is given; joints in the
         stance unless given [rad].
         """
         qpos = np.zeros((len(ids), _POSE + 12))
@@ -109,7 +111,7 @@ class World:
         self._settle(ids)
 
     def push(self, force_w: Float[np.ndarray, "N 3"]) -> None:
-        """Forces on the base origins, world frame [N], until the next call."""
+        """Forces on the base origins, world frame [N], until the next call or `place`."""
         self._applied[:, :3] = force_w
 
     def step(self, target: Float[np.ndarray, "N 12"]) -> Motion:
