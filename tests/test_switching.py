@@ -123,19 +123,16 @@ def test_the_driver_shows_a_policy_what_its_training_environment_shows_it(tmp_pa
         {
             "name": "shuffle",
             "title": "Shuffle",
-            "description": "Changes its state with every lifted front foot.",
+            "description": "Changes its state whenever the front left foot lifts or lands.",
             "dwell": 2,
-            "swing_height": 0.0,
             "ideal_phase": {"FL": 0.0, "FR": 0.5, "BL": 0.5, "BR": 0.0},
             "state": [
-                {"name": "a", "stance": ["FL", "FR"]},
-                {"name": "b", "stance": ["BL", "BR"]},
-                {"name": "c", "stance": list(FEET)},
+                {"name": "all", "stance": list(FEET)},
+                {"name": "three", "stance": ["FR", "BL", "BR"]},
             ],
             "transition": [
-                {"from": "a", "to": "b", "down": [], "up": ["FL"]},
-                {"from": "b", "to": "c", "down": [], "up": ["FR"]},
-                {"from": "c", "to": "a", "down": ["FR"], "up": []},
+                {"from": "all", "to": "three", "down": [], "up": ["FL"]},
+                {"from": "three", "to": "all", "down": ["FL"], "up": []},
             ],
         }
     )
@@ -144,16 +141,16 @@ def test_the_driver_shows_a_policy_what_its_training_environment_shows_it(tmp_pa
     env = GaitEnv(machine, flat(20.0, 20.0), 3, config=config, threads=1)
     driver = Driver({"shuffle": shuffle}, 3, start="shuffle")
     observation, _ = env.reset(seed=0)
-    shown = set()
+    changes = 0
     for _ in range(80):
         action = shuffle(observation)
         target = driver.act(env.world.motion, Command.straight(3, config.forward_speed))
         np.testing.assert_allclose(target, STANCE + ANYMAL_B.action_scale * action, atol=1e-6)
-        observation, _, terminated, _, _ = env.step(action)
+        observation, _, terminated, _, info = env.step(action)
         assert not terminated.any()
         driver.see(env.world.motion)
-        shown |= set(driver.machine_state.tolist())
-    assert shown == {0, 1, 2}, "the machine went round"
+        changes += int(info["changed"].sum())
+    assert changes > 5
 
 
 def test_a_batch_of_robots_is_driven_as_each_alone_would_be(policies):

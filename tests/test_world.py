@@ -166,7 +166,7 @@ def test_torque_is_the_pd_law_within_the_effort_limit():
     for target in wild_targets(1, 40, spread=0.8):
         data = plain(world)
         data.ctrl[:] = target[0]
-        mujoco.mj_step(world.model, data)
+        mujoco.mj_step(world.model, data, nstep=round(PERIOD / PHYSICS_STEP) - 1)
         angles, speeds = data.qpos[7:].copy(), data.qvel[6:].copy()
         mujoco.mj_step(world.model, data)
         motion = world.step(target)

@@ -38,7 +38,8 @@ class Paint:
 
     def __init__(self, stage: Stage) -> None:
         model, terrain = stage.model, stage.terrain
-        rows, columns = model.tex_height[stage.texture], model.tex_width[stage.texture]
+        rows = int(model.tex_height[stage.texture])
+        columns = int(model.tex_width[stage.texture])
         start = int(model.tex_adr[stage.texture])
         texels = model.tex_data[start : start + rows * columns * 3].reshape(rows, columns, 3)
         # MuJoCo's textures begin at the far edge; here rows run along +y, as in terrains.
