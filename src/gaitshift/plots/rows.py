@@ -65,10 +65,18 @@ def draw_contacts(axes: Axes, log: Log, robot: int) -> None:
 
 
 def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
-    """The h_i that the shift condition compares."""
+    """The h_i that the shift condition compares, each from the foot's first touch on."""
     for leg, name in enumerate(LEGS):
-        height, colour = 100 * log.foot_height[:, robot, leg], LEG_COLOURS[leg]
-        axes.plot(log.time, height, color=colour, label=name, drawstyle="steps-post", linewidth=1.5)
+        known = np.cumsum(log.contact[:, robot, leg]) > 0
+        height, colour = 100 * log.foot_height[known, robot, leg], LEG_COLOURS[leg]
+        axes.plot(
+            log.time[known],
+            height,
+            color=colour,
+            label=name,
+            drawstyle="steps-post",
+            linewidth=1.5,
+        )
     axes.legend(
         ncols=4,
         loc="lower right",

@@ -15,7 +15,7 @@ from gaitshift.video.canvas import VideoUnavailable
 _QUALITY = 25
 """x264's constant rate factor."""
 
-_RATE = 950
+_RATE = 900
 """Most kilobits a second: 30 s stay below 4 MB."""
 
 
