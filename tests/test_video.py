@@ -23,6 +23,9 @@ from gaitshift.video.paint import Paint
 from gaitshift.video.stage import SUN, build_stage
 from gaitshift.video.strip import Reading, Strip
 
+AT_ZERO = np.zeros((2, 2))
+"""The course of a robot that stands at x = y = 0."""
+
 SMALL = {"width": 320, "height": 180, "fps": 25}
 
 
@@ -151,7 +154,7 @@ def test_what_is_painted_at_a_place_is_seen_at_that_place(gl):
 
 
 def test_shadow_lies_where_the_sun_casts_it():
-    stage = build_stage(ANYMAL_B, flat(8.0, 6.0), np.zeros((2, 2)), 64, 64)
+    stage = build_stage(ANYMAL_B, flat(8.0, 6.0), AT_ZERO, 64, 64)
     paint, data = Paint(stage), mujoco.MjData(stage.model)
     texture = stage.model.tex_data[stage.model.tex_adr[stage.texture] :]
     rows, columns = (
@@ -173,6 +176,19 @@ def test_shadow_lies_where_the_sun_casts_it():
         trunk = height + 0.02  # middle of the robot's parts, between trunk and feet
         expected = np.array(xy) + np.array(SUN[:2]) / -SUN[2] * trunk
         assert np.allclose(seen, expected, atol=0.12)
+
+
+def test_a_robot_beside_the_ground_casts_no_shadow_and_leaves_no_print():
+    stage = build_stage(
+        ANYMAL_B, from_spec("step:0.1", seed=0, length=4.0, width=4.0), AT_ZERO, 64, 64
+    )
+    paint, data = Paint(stage), mujoco.MjData(stage.model)
+    bare = stage.model.tex_data.copy()
+    data.qpos[:4] = (50.0, -50.0, 0.5, 1.0)
+    mujoco.mj_kinematics(stage.model, data)
+    paint.move_shadow(stage.model, data)
+    paint.add_footprint(np.array([-9.0, 0.0]), "#ff00ff")
+    assert np.array_equal(stage.model.tex_data, bare)
 
 
 def test_camera_does_not_bob_with_the_body_and_goes_as_fast():
@@ -263,6 +279,7 @@ def test_a_video_is_written_whole_or_not_at_all(tmp_path):
         (lambda folder: render(slide(), folder / "a.mp4", t0=5.0), "nothing to show from 5"),
         (lambda folder: render(slide(), folder / "a.mp4", width=321), "even numbers"),
         (lambda folder: render(slide(), folder / "a.mp4", fps=0), "1 to 120"),
+        (lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"), "of a 'dog'"),
         (lambda folder: render(elsewhere(), folder / "a.mp4"), "a ground of its own"),
         (lambda folder: contact_sheet(folder / "no.mp4", folder / "a.png"), "no video"),
         (lambda folder: contact_sheet([], folder / "a.png"), "no pictures"),

@@ -25,9 +25,10 @@ Observations = Float32[np.ndarray, "N D"]
 class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
 
-    An episode ends when the body touches the ground or the machine accepts, and is cut after `episode_steps` or at the
-    border of the terrain. Robots restart in the same step (`AutoresetMode.SAME_STEP`); the
-    observation that ended an episode is in `info["final_obs"]`, where `info["_final_obs"]` holds.
+    An episode ends when the body touches the ground or the machine accepts, and is cut after
+    `episode_steps` or at the border of the terrain. Robots restart in the same step
+    (`AutoresetMode.SAME_STEP`); the observation that ended an episode is in `info["final_obs"]`,
+    where `info["_final_obs"]` holds.
     `info["reward_terms"]` has each weighted term of the reward, `info["changed"]` says where the
     machine changed its state.
     """
@@ -90,13 +91,13 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             swing_scale=self.swing_scale,
         )
         self._steps_in_state = np.where(changed, 0, self._steps_in_state + 1)
-        shows_stance = self.machine.shows_state(self._state, motion.contact)
+        agreement = self.machine.agreement(self._state, motion.contact)
         terms = walk_reward(
             self.config.reward,
             motion,
             self._command,
             stance=self._stance,
-            shows_stance=shows_stance,
+            agreement=agreement,
             action_change=action - self._last_action,
         )
         reward = with_bonus(self.config.reward, sum(terms.values()), bonus)
@@ -105,7 +106,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         info = {
             "reward_terms": terms,
             "changed": changed,
-            "shows_stance": shows_stance,
+            "shows_stance": agreement == 1.0,
             "forward_speed": motion.base_linear_velocity_b[:, 0],
         }
         terminated = motion.body_contact | np.isin(self._state, self.machine.accepting)

@@ -69,6 +69,11 @@ def _write_shares(axes: Axes, log: Log, robot: int) -> None:
     right = axes.get_xlim()[1]
     for leg, share in enumerate(log.contact[:, robot].mean(axis=0)):
         axes.annotate(
-            f"{share:.0%}", (right, leg), (8, 0), textcoords="offset points", va="center", size=12
+            f"{100 * share:.0f} %",
+            (right, leg),
+            (8, 0),
+            textcoords="offset points",
+            va="center",
+            size=12,
         )
     axes.text(right, -0.65, "  stood", va="bottom", size=12, color=QUIET)

@@ -52,6 +52,9 @@ class Lookup:
     is_stance: Bool[np.ndarray, " 16"]
     """Whether a contact label is the stance of any state."""
 
+    agreement: Float[np.ndarray, " states_x_16"]
+    """Share of the feet in which label l agrees with the stance of state u, at index 16 u + l."""
+
     fitting_state: Int[np.ndarray, " 16"]
     """State whose stance agrees with a label on most feet, the lowest where several do."""
 
@@ -77,11 +80,12 @@ class Lookup:
             bonus=np.array([edge.bonus for edge in edges] + [0.0]),
             stance=stance,
             is_stance=np.isin(np.arange(LABEL_COUNT), stance),
-            fitting_state=_fitting_states(stance),
+            agreement=_agreement(stance).ravel(),
+            fitting_state=_agreement(stance).argmax(axis=0),
         )
 
 
-def _fitting_states(stance: Int[np.ndarray, " states"]) -> Int[np.ndarray, " 16"]:
+def _agreement(stance: Int[np.ndarray, " states"]) -> Float[np.ndarray, "states 16"]:
     contact = contact_of(np.arange(LABEL_COUNT))
-    agreeing = (contact[:, None] == contact_of(stance)).sum(axis=-1)
-    return np.where(stance < 0, -1, agreeing).argmax(axis=1)
+    share = (contact == contact_of(stance)[:, None]).mean(axis=-1)
+    return np.where(stance[:, None] < 0, 0.0, share)

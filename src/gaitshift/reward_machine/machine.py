@@ -155,6 +155,15 @@ class RewardMachine:
         """Whether the contacts are the stance of the present state."""
         return label_of(contact) == self._lookup.stance[state]
 
+    def agreement(
+        self, state: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
+    ) -> Float[np.ndarray, " N"]:
+        """Share of the feet that are, down or up, as the stance of the present state has them.
+
+        1 exactly where `shows_state` holds; 0 for an accepting state, which has no stance.
+        """
+        return self._lookup.agreement[state * LABEL_COUNT + label_of(contact)]
+
     def mirrored(self) -> "RewardMachine":
         """Return the machine of the robot seen in a mirror; feet in names of states change too."""
         phase = self.ideal_phase

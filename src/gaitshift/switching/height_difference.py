@@ -59,7 +59,7 @@ class HeightDifference:
     """
 
     alpha: float = 0.04
-    """α [m], |h_i − h_j| above it counts as rough; paper 0.2, ours: twice what trot shows on flat."""
+    """α [m], |h_i − h_j| above it counts as rough; paper 0.2, ours: flat ground stays below."""
 
     beta: float = 200.0
     """β [counts], fire when k exceeds it; paper 1000, ours: some 1.2 s of `perlin:0.10`."""
@@ -68,7 +68,7 @@ class HeightDifference:
     """ε [counts], increment of k (paper III-E: one, or in general some small number)."""
 
     alpha_back: float = 0.035
-    """α' [m], all |h_i − h_j| below it count as flat; ours: 98 % of bound's steps on flat ground."""
+    """α' [m], all |h_i − h_j| below it count as flat; ours: most of bound's steps on flat."""
 
     beta_back: float = 300.0
     """β' [counts], fire back when k exceeds it; ours: 3 s of flat steps, twice what 10 m of

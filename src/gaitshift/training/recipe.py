@@ -69,7 +69,7 @@ class Recipe:
     """The algorithm."""
     stages: tuple[Stage, ...] = (
         Stage(name="flat", iterations=300),
-        Stage(name="rough", iterations=700, amplitude=0.15, push=120.0),
+        Stage(name="rough", iterations=600, amplitude=0.15, push=120.0),
     )
     """Flat ground, then Perlin ground with pushes (paper III-D)."""
     robots: int = 128

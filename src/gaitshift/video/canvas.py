@@ -51,7 +51,7 @@ class Ball:
 
 
 class Canvas:
-    """Draws one model in one size. To be closed when done.
+    """Draws one model in one size; one at a time, to be closed when done.
 
     Raises `VideoUnavailable` where there is no OpenGL. `MUJOCO_GL` is obeyed where it is set; where
     it is not, Linux without a display draws by EGL, which needs no screen.

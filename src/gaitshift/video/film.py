@@ -46,7 +46,11 @@ class FilmWriter:
 
     def add(self, picture: UInt8[np.ndarray, "height width 3"]) -> None:
         """Appends a picture: rows from the top, red, green, blue."""
-        self._frames.send(np.ascontiguousarray(picture))
+        try:
+            self._frames.send(np.ascontiguousarray(picture))
+        except OSError as error:
+            reason = str(error).splitlines()[0]
+            raise GaitshiftError(f"{self._path} cannot be written: {reason}") from error
 
     def __enter__(self) -> "FilmWriter":
         return self

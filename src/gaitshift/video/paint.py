@@ -113,11 +113,12 @@ class Paint:
         xy: Float[np.ndarray, " 2"],
         reach: float,
     ) -> tuple[tuple[slice, slice], Image.Image, Float[np.ndarray, " 2"]]:
-        """The square of half side `reach` [m] around a point: its place, a copy, its corner."""
+        """The square of half side `reach` [m] around a point: its place, a copy, its corner.
+
+        Only what lies on the ground of it; where nothing does, one texel of the rim.
+        """
         rows, columns = picture.shape[:2]
-        low = np.floor(self._texel(xy - reach)).astype(int)
-        high = np.ceil(self._texel(xy + reach)).astype(int)
-        left, right = (int(v) for v in np.clip((low[0], high[0]), 0, columns))
-        top, bottom = (int(v) for v in np.clip((low[1], high[1]), 0, rows))
-        window = slice(top, max(bottom, top)), slice(left, max(right, left))
-        return window, Image.fromarray(picture[window]), np.array([left, top], dtype=float)
+        low = np.clip(np.floor(self._texel(xy - reach)), 0, (columns - 1, rows - 1)).astype(int)
+        high = np.clip(np.ceil(self._texel(xy + reach)), low + 1, (columns, rows)).astype(int)
+        window = slice(low[1], high[1]), slice(low[0], high[0])
+        return window, Image.fromarray(picture[window]), low.astype(float)

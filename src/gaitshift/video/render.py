@@ -17,6 +17,7 @@ from gaitshift.plots.signals import (
     walks_on_kept_ground,
     window,
 )
+from gaitshift.robot import ROBOTS
 from gaitshift.video.film import FilmWriter
 from gaitshift.video.playback import Playback
 from gaitshift.video.strip import Reading, Strip
@@ -52,11 +53,7 @@ def render(
             keep, a size or rate that makes no video, another file ending, or no such folder.
     """
     _check_target(path, width, height, fps)
-    check_robot(log, robot)
-    if not walks_on_kept_ground(log, robot):
-        raise GaitshiftError(
-            f"robot {robot} walked on a ground of its own, and the log keeps the first robot's only"
-        )
+    _check_log(log, robot)
     log = window(log, t0, t1)
     entries = _entries(log, fps)
     readings = _readings(log, robot)
@@ -81,6 +78,16 @@ def _check_target(path: Path, width: int, height: int, fps: int) -> None:
         )
     if not 1 <= fps <= 120:
         raise GaitshiftError(f"{fps} pictures a second: 1 to 120 would be right")
+
+
+def _check_log(log: Log, robot: int) -> None:
+    check_robot(log, robot)
+    if log.robot not in ROBOTS:
+        raise GaitshiftError(f"the log is of a '{log.robot}'; known robots: {', '.join(ROBOTS)}")
+    if not walks_on_kept_ground(log, robot):
+        raise GaitshiftError(
+            f"robot {robot} walked on a ground of its own, and the log keeps the first robot's only"
+        )
 
 
 def _entries(log: Log, fps: int) -> list[int]:

@@ -61,9 +61,8 @@ class Strip:
             self._draw_counter(pen, reading)
         right, middle = self.width - self._px(32), self.height / 2
         pen.text((right, middle), f"{reading.time:.1f} s", PAPER, self._plain, "rm")
-        pen.text(
-            (right - self._px(140), middle), f"{reading.speed:.2f} m/s", PAPER, self._plain, "rm"
-        )
+        speed = f"{round(reading.speed, 2) + 0.0:.2f} m/s"  # never -0.00
+        pen.text((right - self._px(140), middle), speed, PAPER, self._plain, "rm")
         return np.asarray(image)
 
     def _draw_gait(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:

@@ -92,8 +92,8 @@ class World:
     ) -> None:
         """Sets robots down with the base upright and the lowest foot on the ground.
 
-        `ids` are in rising order. Base at `xy` [m] and `yaw` [rad], at rest unless a velocity [m/s] is given; joints in the
-        stance unless given [rad].
+        `ids` are in rising order. Base at `xy` [m] and `yaw` [rad], at rest unless a velocity [m/s]
+        is given; joints in the stance unless given [rad].
         """
         qpos = np.zeros((len(ids), _POSE + 12))
         qpos[:, :2] = xy
