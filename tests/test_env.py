@@ -237,6 +237,9 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
             assert info["changed"][robot] == taken
             stance = [states[robot] == 0, states[robot] == 1, True, True]
             assert info["shows_stance"][robot] == (contact == stance)
+            agreeing = sum(foot == due for foot, due in zip(contact, stance, strict=True))
+            weight = env.config.reward.stance_feet
+            assert info["reward_terms"]["stance_feet"][robot] == weight * agreeing / 4
             terms = sum(float(term[robot]) for term in info["reward_terms"].values())
             bonus = env.config.reward.bonus * factor if taken else 0.0
             assert reward[robot] == pytest.approx(terms + bonus, abs=1e-9)
@@ -363,8 +366,8 @@ def test_the_papers_environment_shows_no_command_and_asks_for_no_turn():
         *_, info = env.step(action)
         turning = env.world.motion.base_angular_velocity_b[:, 2]
         np.testing.assert_allclose(info["reward_terms"]["yaw_rate"], -25.0 * turning**2)
-        for name in ("stance_pattern", "slip", "action_rate"):
-            assert not info["reward_terms"][name].any()
+        silent = {name for name, term in info["reward_terms"].items() if not term.any()}
+        assert len(info["reward_terms"]) - len(silent) == 7, "the terms of Table I alone"
 
 
 # The ends of episodes ---------------------------------------------------------------------------
@@ -423,6 +426,43 @@ def test_a_body_on_the_ground_terminates_and_is_shown_in_the_final_observation_a
     for name in ("joint_velocity", "base_angular_velocity_b", "last_action", "steps_in_state"):
         assert not fresh[slices[name]].any(), name
     np.testing.assert_array_equal(fresh[slices["machine_state"]], [1, 0])
+
+
+def test_a_machine_that_accepts_ends_the_episode_with_its_bonus_and_without_a_fall(monkeypatch):
+    tick_off = RewardMachine.from_dict(
+        {
+            "name": "lift",
+            "title": "Lift",
+            "description": "The task is done when the front left foot is lifted.",
+            "dwell": 5,
+            "ideal_phase": {"FL": 0.0, "FR": 0.0, "BL": 0.0, "BR": 0.0},
+            "state": [
+                {"name": "standing", "stance": ["FL", "FR", "BL", "BR"]},
+                {"name": "done", "accepting": True},
+            ],
+            "transition": [{"from": "standing", "to": "done", "down": ["BR"], "up": ["FL"]}],
+        }
+    )
+    config = EnvConfig(velocity_noise=0.0, joint_noise=0.0)
+    env = GaitEnv(tick_off, FLAT, 2, config=config, threads=1)
+    env.reset(seed=0)
+    motions = keep_motions(env, monkeypatch)
+    lift = np.zeros((2, 12))
+    lift[1, 1:3] = FOLD[0, 1:3]
+    for step in range(1, 60):
+        observation, reward, terminated, truncated, info = env.step(lift if step > 10 else 0 * lift)
+        if terminated.any():
+            break
+    assert step > 10
+    assert terminated.tolist() == [False, True]
+    assert not truncated.any()
+    assert not motions[-1].body_contact.any()
+    assert motions[-1].contact[1].tolist() == [False, True, True, True]
+    terms = sum(term[1] for term in info["reward_terms"].values())
+    assert reward[1] == pytest.approx(terms + env.config.reward.bonus)
+    state = env.observe.slices["machine_state"]
+    np.testing.assert_array_equal(info["final_obs"][1, state], [0, 1])
+    np.testing.assert_array_equal(observation[1, state], [1, 0])
 
 
 def test_a_robot_that_falls_in_its_last_step_is_terminated_and_not_truncated():

@@ -22,7 +22,15 @@ TABLE_I = {
     "joint_velocity": -0.01,
 }
 """Weights as the paper prints them."""
-CONFIG = replace(RewardConfig.paper(), stance_pattern=3.0, slip=-0.5, action_rate=-0.02)
+CONFIG = replace(
+    RewardConfig.paper(),
+    speed_tracking=2.0,
+    stance_feet=5.0,
+    stance_pattern=3.0,
+    slip=-0.5,
+    action_rate=-0.02,
+)
+"""Table I and round numbers for what is ours."""
 STANCE = np.array([0.1, -0.2, 0.3, -0.4, 0.5, -0.6, 0.7, -0.8, 0.9, -1.0, 1.1, -1.2])
 RAMP = np.arange(1.0, 13.0)
 """1 … 12, of which the squares sum up to 650."""
@@ -84,7 +92,7 @@ def three_robots():
             forward_speed=np.array([1.2, 0.2, 1.2]), yaw_rate=np.array([0.1, -0.2, 0.0])
         ),
         "stance": STANCE,
-        "shows_stance": np.array([True, False, True]),
+        "agreement": np.array([1.0, 0.75, 0.5]),
         "action_change": np.stack([0.1 * RAMP, np.zeros(12), -np.ones(12)]),
     }
 
@@ -106,8 +114,12 @@ HAND_TABLE = {
     "joint_position": (-0.0065, -0.018, 0.0),
     # -0.01 · 0.25 · 650; -0.01 · 4; nothing
     "joint_velocity": (-1.625, -0.04, 0.0),
-    # 3 where the stance shows
-    "stance_pattern": (3.0, 0.0, 3.0),
+    # 2 exp(-(0.5 / 0.25)²) = 2 exp(-4); 2 exp(-(1 / 0.25)²) = 2 exp(-16); 2 exp(-0.64)
+    "speed_tracking": (0.03663127777746836, 2.2507034943851823e-07, 1.0545848480860982),
+    # 5 times the share of four, three and two feet
+    "stance_feet": (5.0, 3.75, 2.5),
+    # 3 where all four agree
+    "stance_pattern": (3.0, 0.0, 0.0),
     # -0.5 (FL 0.01 + 0.04, BL 0.09 + 0.16); no foot down; -0.5 (FR 0.36 + 0.64, BR 0.04)
     "slip": (-0.15, 0.0, -0.52),
     # -0.02 · 0.01 · 650; nothing; -0.02 · 12
@@ -138,7 +150,7 @@ def test_a_weight_of_zero_silences_its_term():
         assert all(term.any() for term in others)
 
 
-def test_perfect_motion_earns_the_whole_first_term_and_no_penalty():
+def test_perfect_motion_earns_every_reward_whole_and_no_penalty():
     fields = still(1)
     fields["base_linear_velocity_w"] = np.array([[0.9, 0.0, 0.0]])
     fields["base_angular_velocity_b"] = np.array([[0.0, 0.0, 0.3]])
@@ -147,11 +159,12 @@ def test_perfect_motion_earns_the_whole_first_term_and_no_penalty():
         Motion(**fields),
         Command(forward_speed=np.array([0.9]), yaw_rate=np.array([0.3])),
         stance=STANCE,
-        shows_stance=np.array([True]),
+        agreement=np.ones(1),
         action_change=np.zeros((1, 12)),
     )
     earned = {name: term.item() for name, term in terms.items() if term.item() != 0}
-    assert earned == {"forward_velocity": 10.0, "stance_pattern": 3.0}
+    ours = {"speed_tracking": 2.0, "stance_feet": 5.0, "stance_pattern": 3.0}
+    assert earned == {"forward_velocity": 10.0, **ours}
 
 
 @settings(max_examples=30, deadline=None)

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+CONTROL_PERIOD = 0.01
+"""One control step [s]: the paper's 100 Hz (IV-A)."""
+
 PAPER_SPEED = 1.2
 """Commanded forward speed v_d [m/s] (paper III-C)."""
 

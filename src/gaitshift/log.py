@@ -76,8 +76,8 @@ class Log:
             GaitshiftError: no such file, not an npz file, or an array is missing.
         """
         try:
-            with np.load(path) as file:
-                arrays = {name: file[name] for name in file.files}
+            with path.open("rb") as file, np.load(file) as entries:
+                arrays = {name: entries[name] for name in entries.files}
         except FileNotFoundError as error:
             raise GaitshiftError(f"no log file {path}") from error
         except (OSError, ValueError, zipfile.BadZipFile) as error:

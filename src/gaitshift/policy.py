@@ -10,6 +10,7 @@ import numpy as np
 import onnxruntime
 from jaxtyping import Float, Float32
 
+from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
 from gaitshift.observation import Observation
 from gaitshift.reward_machine import RewardMachine
@@ -110,8 +111,11 @@ def load(name_or_path: str | Path) -> Policy:
         raise GaitshiftError(f"no policy file {path}")
     session = _open(path)
     info = _read_info(path, session.get_modelmeta().custom_metadata_map)
-    policy = Policy(path, info, _machine(path, info), session)
-    _check(policy)
+    try:
+        policy = Policy(path, info, RewardMachine.from_dict(info.machine), session)
+        _check(policy)
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{path}: {error}") from error
     return policy
 
 
@@ -147,32 +151,27 @@ def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
     return PolicyInfo(**values)
 
 
-def _machine(path: Path, info: PolicyInfo) -> RewardMachine:
-    try:
-        return RewardMachine.from_dict(info.machine)
-    except GaitshiftError as error:
-        raise GaitshiftError(f"{path}: {error}") from error
-
-
 def _check(policy: Policy) -> None:
     """Refuses a policy whose robot is unknown or whose parts contradict each other."""
-    path, info = policy.path, policy.info
+    info = policy.info
     if info.robot not in ROBOTS:
+        raise GaitshiftError(f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}")
+    if info.control_rate != 1.0 / CONTROL_PERIOD:
         raise GaitshiftError(
-            f"{path} is for the robot '{info.robot}'; known here: {', '.join(ROBOTS)}"
+            f"it acts {info.control_rate:g} times a second; {1.0 / CONTROL_PERIOD:g} would be right"
         )
     robot = policy.robot
     gains = robot.gains_of(info.gains)
     if (gains.kp, gains.kd) != (info.kp, info.kd):
         raise GaitshiftError(
-            f"{path} was trained with kp {info.kp}, kd {info.kd}, but the preset '{info.gains}' "
+            f"it was trained with kp {info.kp}, kd {info.kd}, but the preset '{info.gains}' "
             f"of {robot.name} is kp {gains.kp}, kd {gains.kd}"
         )
     if list(robot.stance) != info.stance:
-        raise GaitshiftError(f"{path} was trained from another stance of {robot.name}")
+        raise GaitshiftError(f"it was trained from another stance of {robot.name}")
     expected = {name: [s.start, s.stop] for name, s in policy.observation.slices.items()}
     wanted = policy.session.get_inputs()[0].shape[1]
     if expected != info.observation or wanted != policy.observation.size:
         raise GaitshiftError(
-            f"{path}: its observation slices do not add up to its network's {wanted} inputs"
+            f"its observation slices do not add up to its network's {wanted} inputs"
         )

@@ -10,10 +10,10 @@ from mujoco.batch import Batch
 
 from gaitshift import gaits
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
+from gaitshift.command import CONTROL_PERIOD
 from gaitshift.env import GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.terrain import from_spec
-from gaitshift.world.world import CONTROL_PERIOD
 
 ROUNDS = 7
 """Rounds in which both are measured in turn; medians over them are quoted."""

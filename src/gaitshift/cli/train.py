@@ -59,7 +59,7 @@ class Train:
         if self.json:
             emit_json({**(last[0] if last else {}), "policy": str(path)})
         else:
-            print(f"policy written to {path}; judge it with: gaitshift evaluate --policy {path}")
+            print(f"policy written to {path}; judge it with: gaitshift evaluate {path}")
 
     def _open(self) -> "Run":
         try:

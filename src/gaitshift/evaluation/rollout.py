@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.command import PAPER_SPEED, Command, HeadingLoop
+from gaitshift.command import CONTROL_PERIOD, PAPER_SPEED, Command, HeadingLoop
 from gaitshift.log import Log
 from gaitshift.motion import Motion
 from gaitshift.switching import Decision, Driver, Switcher
@@ -31,7 +31,7 @@ class RolloutConfig:
     @property
     def steps(self) -> int:
         """Control steps of the run."""
-        return max(1, round(self.seconds * 100))
+        return max(1, round(self.seconds / CONTROL_PERIOD))
 
 
 def rollout(
@@ -67,7 +67,7 @@ def rollout(
         driver.see(motion)
         decision = None
         if switcher is not None:
-            decision = switcher.step((step + 1) / 100, motion, driver)
+            decision = switcher.step((step + 1) * CONTROL_PERIOD, motion, driver)
         recorder.add(motion, command, decision, fallen)
         command = _command(config, motion, start_xy)
         if step % 25 == 24:
@@ -125,7 +125,7 @@ class _Recorder:
         terrain = self._world.terrains[0]
         columns = {name: np.stack(values) for name, values in self._columns.items()}
         return Log(
-            time=np.arange(1, len(columns["k"]) + 1) / 100,
+            time=np.arange(1, len(columns["k"]) + 1) * CONTROL_PERIOD,
             **columns,
             gaits=self._driver.gaits,
             robot=self._driver.robot.name,

@@ -8,9 +8,9 @@ import torch
 from onnx import TensorProto, helper, numpy_helper
 from rsl_rl.models import MLPModel
 
+from gaitshift.command import CONTROL_PERIOD
 from gaitshift.env import GaitEnv
 from gaitshift.policy import PolicyInfo
-from gaitshift.world.world import CONTROL_PERIOD
 
 OPSET = 18
 """ONNX operator set; every onnxruntime of the last years reads it."""

@@ -31,5 +31,5 @@ def draw_ground(stage: Stage, within: int, seed: int) -> Terrain:
         return flat(FIELD, FIELD)
     rng = np.random.default_rng((seed, within))
     grown = min(1.0, FIRST_SHARE + (1 - FIRST_SHARE) * within / max(1, stage.iterations / 2))
-    amplitude = max(0.01, stage.amplitude * grown * rng.uniform(0.0, 1.0) ** 0.5)
+    amplitude = stage.amplitude * grown * rng.uniform(0.0, 1.0) ** 0.5
     return perlin(amplitude, seed=rng, length=FIELD, width=FIELD)

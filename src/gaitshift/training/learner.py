@@ -9,6 +9,7 @@ from rsl_rl.models import MLPModel
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
+from gaitshift.command import CONTROL_PERIOD
 from gaitshift.env import GaitEnv
 from gaitshift.observation import JOINT_MIRROR
 from gaitshift.training.recipe import Recipe
@@ -89,7 +90,7 @@ class _Statistics:
             "reward": reward,
             "speed": info["forward_speed"],
             "falls": terminated,
-            "changes_per_s": 100.0 * info["changed"],
+            "changes_per_s": info["changed"] / CONTROL_PERIOD,
             "stance_fraction": info["shows_stance"],
             **{f"reward/{name}": term for name, term in info["reward_terms"].items()},
         }

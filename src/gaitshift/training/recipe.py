@@ -80,7 +80,9 @@ class Recipe:
     """Iteration from which the guards' swing height grows from 0; ours: asked for from the start
     it hides the cycle from exploration."""
     swing_until: int = 210
-    """Iteration at which the guards ask for their whole swing height."""
+    """Iteration at which the guards ask for their swing height."""
+    swing_share: float = 1.0
+    """Share of the swing height that they ask for then; 0: none, as in the paper."""
     checkpoint_every: int = 25
     """Iterations between two checkpoints."""
     threads: int = 2
@@ -91,6 +93,8 @@ class Recipe:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise GaitshiftError(f"{name} = {value}: {low} to {high} would be right")
+        if not 0 <= self.swing_from < self.swing_until:
+            raise GaitshiftError("swing_from must be 0 or more and lie before swing_until")
         if any(stage.iterations < 0 for stage in self.stages) or self.iterations < 1:
             raise GaitshiftError("iterations: at least 1 would be right")
 
@@ -105,18 +109,18 @@ class Recipe:
             raise GaitshiftError(f"{iterations} iterations: at least 1 would be right")
         stages: list[Stage] = []
         left = iterations
-        for stage in self.stages:
-            take = left if stage is self.stages[-1] else min(stage.iterations, left)
+        for index, stage in enumerate(self.stages, start=1):
+            take = left if index == len(self.stages) else min(stage.iterations, left)
             stages.append(replace(stage, iterations=take))
             left -= take
         return replace(self, stages=tuple(s for s in stages if s.iterations > 0))
 
     def swing_scale(self, iteration: int) -> float:
         """Share of the guards' swing height asked for at this iteration."""
-        if self.swing_until <= self.swing_from:
-            return 1.0
+        if iteration >= self.swing_until:
+            return self.swing_share
         grown = (iteration - self.swing_from) / (self.swing_until - self.swing_from)
-        return min(max(grown, 0.0), 1.0)
+        return self.swing_share * max(grown, 0.0)
 
     @classmethod
     def paper(cls) -> "Recipe":
@@ -141,8 +145,7 @@ class Recipe:
             stages=(Stage(name="flat", iterations=500),),
             robots=30,
             steps=100,
-            swing_from=0,
-            swing_until=0,
+            swing_share=0.0,
         )
 
 

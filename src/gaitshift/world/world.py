@@ -7,14 +7,12 @@ import numpy as np
 from jaxtyping import Float, Int
 from mujoco.batch import Batch
 
+from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
 from gaitshift.robot import Robot
 from gaitshift.terrain import Terrain
 from gaitshift.world.scene import build_model
-
-CONTROL_PERIOD = 0.01
-"""One control step [s]: the paper's 100 Hz."""
 
 CONTACT_FORCE = 1.0
 """A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
