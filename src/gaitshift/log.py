@@ -3,6 +3,7 @@
 import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -64,7 +65,7 @@ class Log:
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""
         part = path.with_suffix(".part.npz")
-        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        arrays: dict[str, Any] = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
         np.savez_compressed(part, **arrays)
         part.replace(path)
 
@@ -77,13 +78,15 @@ class Log:
         """
         try:
             with path.open("rb") as file, np.load(file) as entries:
-                arrays = {name: entries[name] for name in entries.files}
+                values: dict[str, Any] = {name: entries[name] for name in entries.files}
         except FileNotFoundError as error:
             raise GaitshiftError(f"no log file {path}") from error
         except (OSError, ValueError, zipfile.BadZipFile) as error:
             raise GaitshiftError(f"{path} is not a whole npz file: {error}") from error
-        missing = [f.name for f in fields(cls) if f.name not in arrays]
+        missing = [f.name for f in fields(cls) if f.name not in values]
         if missing:
             raise GaitshiftError(f"{path} is no log of gaitshift: it lacks '{missing[0]}'")
-        texts = {name: str(arrays[name]) for name in ("robot", "terrain")}
-        return cls(**{**arrays, **texts, "gaits": tuple(str(name) for name in arrays["gaits"])})
+        for name in ("robot", "terrain"):
+            values[name] = str(values[name])
+        values["gaits"] = tuple(str(name) for name in values["gaits"])
+        return cls(**values)

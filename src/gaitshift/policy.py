@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import onnxruntime
@@ -81,7 +81,8 @@ class Policy:
 
     def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
         """The deterministic actions for N observations."""
-        return self.session.run(None, {"observation": observation})[0]
+        outputs = cast(Any, self.session).run(None, {"observation": observation})
+        return outputs[0]
 
     def target(self, action: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "N 12"]:
         """Joint targets [rad] of an action."""
@@ -110,7 +111,7 @@ def load(name_or_path: str | Path) -> Policy:
     if not path.is_file():
         raise GaitshiftError(f"no policy file {path}")
     session = _open(path)
-    info = _read_info(path, session.get_modelmeta().custom_metadata_map)
+    info = _read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
     try:
         policy = Policy(path, info, RewardMachine.from_dict(info.machine), session)
         _check(policy)
@@ -120,7 +121,7 @@ def load(name_or_path: str | Path) -> Policy:
 
 
 def _open(path: Path) -> onnxruntime.InferenceSession:
-    options = onnxruntime.SessionOptions()
+    options = cast(Any, onnxruntime).SessionOptions()
     options.intra_op_num_threads = 1  # the networks are small, the cores belong to the physics
     options.log_severity_level = 4
     try:
@@ -170,7 +171,7 @@ def _check(policy: Policy) -> None:
     if list(robot.stance) != info.stance:
         raise GaitshiftError(f"it was trained from another stance of {robot.name}")
     expected = {name: [s.start, s.stop] for name, s in policy.observation.slices.items()}
-    wanted = policy.session.get_inputs()[0].shape[1]
+    wanted: Any = cast(Any, policy.session).get_inputs()[0].shape[1]
     if expected != info.observation or wanted != policy.observation.size:
         raise GaitshiftError(
             f"its observation slices do not add up to its network's {wanted} inputs"

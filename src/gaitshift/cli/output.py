@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,7 @@ def emit_table(title: str, rows: list[tuple[str, str]]) -> None:
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Report]:
+def progress(label: str) -> Generator[Report]:
     """A progress bar on stderr, with the time left; silent where stderr is no terminal."""
     columns = (
         TextColumn("{task.description}"),

@@ -100,7 +100,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             agreement=agreement,
             action_change=action - self._last_action,
         )
-        reward = with_bonus(self.config.reward, sum(terms.values()), bonus)
+        reward = with_bonus(self.config.reward, np.sum(list(terms.values()), axis=0), bonus)
         self._last_action = action
         self._age += 1
         info = {

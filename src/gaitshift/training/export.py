@@ -1,12 +1,13 @@
 """A trained actor as a policy file."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import onnx
 import torch
-from onnx import TensorProto, helper, numpy_helper
+from onnx import NodeProto, TensorProto, helper, numpy_helper
 from rsl_rl.models import MLPModel
+from rsl_rl.modules import EmpiricalNormalization
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.env import GaitEnv
@@ -40,7 +41,8 @@ def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
     The graph is written out layer by layer (normalisation, then linear and leaky ReLU in turn): the
     network is no more than that, and the file then depends on no tracer's version.
     """
-    nodes, constants = [], []
+    nodes: list[NodeProto] = []
+    constants: list[TensorProto] = []
     flow = "observation"
 
     def constant(name: str, value: torch.Tensor) -> str:
@@ -53,11 +55,11 @@ def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
         return output
 
     if actor.obs_normalization:
-        normalizer = actor.obs_normalizer
-        mean = constant("mean", normalizer._mean)
-        std = constant("std", normalizer._std + normalizer.eps)
+        normalizer = cast(EmpiricalNormalization, actor.obs_normalizer)
+        mean = constant("mean", normalizer.mean)
+        std = constant("std", normalizer.std + normalizer.eps)
         flow = node("Div", [node("Sub", [flow, mean]), std])
-    for index, layer in enumerate(actor.mlp):
+    for index, layer in enumerate(actor.mlp.children()):
         if isinstance(layer, torch.nn.Linear):
             weight = constant(f"weight_{index}", layer.weight)
             bias = constant(f"bias_{index}", layer.bias)

@@ -1,6 +1,6 @@
 """rsl_rl's PPO on a `GaitEnv`: one object that collects and learns an iteration at a time."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
@@ -48,11 +48,10 @@ class Learner:
                 self._collect(statistics)
             self.ppo.compute_returns(self._observation)
         losses = self.ppo.update()
-        std = float(self.ppo.actor.distribution.std_param.detach().mean())
         return {
             **statistics.means(),
             "value_loss": losses["value"],
-            "action_std": std,
+            "action_std": float(self.ppo.actor.output_std.mean()),
             "learning_rate": self.ppo.learning_rate,
         }
 
@@ -115,11 +114,14 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         "activation": "lrelu",
         "obs_normalization": config.normalize_observations,
     }
-    distribution = {"class_name": "GaussianDistribution", "init_std": config.initial_std}
-    distribution["std_range"] = (0.05, 2.0)
+    distribution: dict[str, Any] = {
+        "class_name": "GaussianDistribution",
+        "init_std": config.initial_std,
+        "std_range": (0.05, 2.0),
+    }
     actor = MLPModel(observation, _GROUPS, "actor", 12, **network, distribution_cfg=distribution)
     with torch.no_grad():  # the first actions are then nearly the stance
-        actor.mlp[-1].weight *= config.output_gain
+        cast(torch.nn.Linear, actor.mlp[-1]).weight.mul_(config.output_gain)
     critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
     symmetric = config.mirror and env.machine.mirrored_states() is not None

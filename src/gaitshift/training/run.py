@@ -11,6 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import cattrs
 import numpy as np
 import torch
 from torch.utils.tensorboard import SummaryWriter
@@ -19,7 +20,6 @@ from gaitshift.env import GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
-from gaitshift.training.config_file import recipe_from_dict
 from gaitshift.training.export import describe, export
 from gaitshift.training.ground import FIELD, draw_ground, stage_at
 from gaitshift.training.learner import Learner
@@ -92,11 +92,11 @@ class Run:
         try:
             config = json.loads((folder / CONFIG).read_text())
             machine = RewardMachine.from_dict(config["machine"])
-            recipe = recipe_from_dict(config["recipe"])
+            recipe = cattrs.structure(config["recipe"], Recipe)
             run = cls(folder, machine, recipe, config["seed"], config["command"])
         except FileNotFoundError as error:
             raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
-        except (json.JSONDecodeError, KeyError) as error:
+        except (ValueError, KeyError, TypeError, cattrs.BaseValidationError) as error:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
         checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
         if not checkpoints:
@@ -165,7 +165,7 @@ class Run:
     def _save_checkpoint(self) -> None:
         path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
         part = path.with_suffix(".part")
-        state = {
+        state: dict[str, Any] = {
             "iteration": self.iteration,
             "wall_s": self._wall,
             "torch_rng": torch.get_rng_state(),
@@ -176,7 +176,7 @@ class Run:
 
     def _load_checkpoint(self, path: Path) -> None:
         try:
-            state = torch.load(path, weights_only=True)
+            state: dict[str, Any] = torch.load(path, weights_only=True)
         except Exception as error:  # torch has no common class for a damaged file
             raise GaitshiftError(
                 f"{path} is damaged; remove it to go on from the one before"

@@ -97,12 +97,12 @@ class World:
         qpos[:, :2] = xy
         qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
         qpos[:, _POSE:] = self._stance if joint_position is None else joint_position
-        self._batch.reset(ids=ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._batch.reset(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self._qpos[ids] = qpos
         self._qvel[ids] = 0.0
         if base_velocity_w is not None:
             self._qvel[ids, :3] = base_velocity_w
-        self._batch.forward(ids=ids, stage=mujoco.mjtStage.mjSTAGE_POS)
+        self._batch.forward(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_POS))
         feet = self._feet(self._sensors[ids])
         below = (feet[..., 2] - self._ground(feet[..., :2], ids)).min(axis=1)
         self._qpos[ids, 2] -= below
@@ -125,7 +125,7 @@ class World:
                 f"joint target of robot {bad}, {joint}, is not a number; nothing was moved"
             )
         self._ctrl[:] = target
-        self._batch.step(nstep=self._substeps, stage=mujoco.mjtStage.mjSTAGE_VEL)
+        self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
         self.motion = self._measure()
         return self.motion
 
