@@ -51,7 +51,7 @@ class Learner:
         return {
             **statistics.means(),
             "value_loss": losses["value"],
-            "action_std": float(self.ppo.actor.output_std.mean()),
+            "action_std": float(self.ppo.actor.output_std.detach().mean()),
             "learning_rate": self.ppo.learning_rate,
         }
 
