@@ -98,9 +98,7 @@ def test_an_output_folder_with_other_content_is_left_alone(
     out = str(tmp_path)
     for command in (["demo"], ["train", "trot", *TINY], ["gaits", "trot"]):
         assert "--overwrite" in refusal(capsys, *command, "--out", out)
-    assert "not overwritten" in refusal(
-        capsys, "train", "trot", *TINY, "--out", out, "--overwrite"
-    )
+    assert "not overwritten" in refusal(capsys, "train", "trot", *TINY, "--out", out, "--overwrite")
     assert "exists" in refusal(capsys, "evaluate", "trot", "--log", str(mine))
     assert mine.read_text() == "years of work"
     assert list(tmp_path.iterdir()) == [mine]
@@ -159,9 +157,19 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
 
 @pytest.mark.slow
 def test_ctrl_c_leaves_a_run_that_goes_on(tmp_path: Path) -> None:
-    """Interrupted in the middle of a training: exit code 130, no traceback, and --resume ends it."""
+    """Interrupted in a training: exit code 130, no traceback, and --resume ends it."""
     out = tmp_path / "run"
-    command = [sys.executable, "-m", "gaitshift", "train", "trot", "--robots", "8", "--out", str(out)]
+    command = [
+        sys.executable,
+        "-m",
+        "gaitshift",
+        "train",
+        "trot",
+        "--robots",
+        "8",
+        "--out",
+        str(out),
+    ]
     process = subprocess.Popen(
         [*command, "--iterations", "40"], stderr=subprocess.PIPE, env=os.environ, text=True
     )

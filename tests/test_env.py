@@ -585,6 +585,18 @@ def test_a_push_moves_the_robot_its_way(monkeypatch):
     assert not np.any(forces)
 
 
+def test_a_push_ends_with_the_episode(monkeypatch):
+    push = PushConfig(force=50.0, duration=50, interval=60)
+    env = hop(8, episode_steps=40, push=push)
+    env.reset(seed=0)
+    pushed = []
+    monkeypatch.setattr(env.world, "push", lambda force_w: pushed.append(force_w.any(axis=1)))
+    for _ in range(41):
+        env.step(np.zeros((8, 12)))
+    assert pushed[39].all(), "pauses last at most ten steps here"
+    assert pushed[40].mean() < 0.5, "and episodes begin with one"
+
+
 def test_without_pushes_a_standing_robot_stays_where_it_stands():
     env = hop(4, velocity_noise=0.0, joint_noise=0.0)
     env.reset(seed=0)

@@ -54,8 +54,10 @@ def test_robots_run_alone_as_they_run_in_a_batch(trot: policy.Policy) -> None:
 
 
 def _synthetic_log(*, speed: float, period: int, steps: int, fallen_from: int | None) -> Log:
-    """Robot 0 moves along x at `speed`, its feet in a perfect trot of `period` steps; robot 1
-    lies still."""
+    """Robot 0 trots perfectly.
+
+    It moves along x at `speed`, its feet with a period of `period` steps; robot 1 lies still.
+    """
     time = np.arange(1, steps + 1) / 100
     qpos, qvel = np.zeros((steps, 2, 19)), np.zeros((steps, 2, 18))
     qpos[..., 3] = 1.0

@@ -204,7 +204,7 @@ def test_firing_restarts_the_count_and_keeps_the_heights():
 def test_alpha_can_change_between_steps_and_the_count_goes_on():
     z = np.array([[0.0, 0.1, 0.3, 0.6]])
     contact = np.ones((1, 4), dtype=bool)
-    state = HeightState(height=z, touched=contact, k=np.array([7.0]))
+    state = HeightState(height=z, touched=contact, k=np.array([7.0]), counted=np.array([7.0]))
     assert walk(replace(PAPER, alpha=0.25), z, contact, state=state)[0].item() == 7 + 4
     assert walk(replace(PAPER, alpha=0.55), z, contact, state=state)[0].item() == 7 + 1
 

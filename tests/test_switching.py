@@ -366,9 +366,9 @@ def test_each_entry_of_a_schedule_is_carried_out_once_when_it_is_due(policies):
     ]
 
 
-def test_entries_that_are_overdue_are_carried_out_in_order(policies):
+def test_entries_that_fall_due_together_are_carried_out_in_order(policies):
     driver = Driver(policies, 1, start="trot")
-    switcher = Scheduled(((0.0, "bound"), (0.0, "pace")))
+    switcher = Scheduled(((3.0, "bound"), (3.0, "pace")))
     switcher.step(3.0, motion_of(["FL BL"]), driver)
     assert gaits_of(driver) == ["pace"]
 

@@ -15,7 +15,7 @@ from gaitshift.plots import training_curves
 
 POLICIES = Path(policy.__file__).parent / "policies"
 CURVES = Path(__file__).parent.parent / "docs" / "results" / "training"
-GROUNDS = ("flat", "perlin:0.10", "perlin:0.15", "slope:10", "stairs:0.05", "step:0.10")
+GROUNDS = ("flat", "perlin:0.10", "perlin:0.15", "slope:10")
 COLUMNS = ("iteration", "stage", "steps", "wall_s", "reward", "speed", "survival", "changes_per_s")
 EVERY = 10
 

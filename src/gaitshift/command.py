@@ -8,6 +8,10 @@ from jaxtyping import Float, Int
 CONTROL_PERIOD = 0.01
 """One control step [s]: the paper's 100 Hz (IV-A)."""
 
+ACTION_LIMIT = 10.0
+"""Actions are clipped to ± this, in training as after it; ours: 3 rad of joint target, beyond
+anything a walking leg asks for."""
+
 PAPER_SPEED = 1.2
 """Commanded forward speed v_d [m/s] (paper III-C)."""
 

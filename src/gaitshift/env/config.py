@@ -8,9 +8,6 @@ from gaitshift.observation import DEFAULT_SLICES, PAPER_SLICES
 from gaitshift.reward import RewardConfig
 from gaitshift.world import PushConfig
 
-ACTION_LIMIT = 10.0
-"""Actions are clipped here; ours: 3 rad of target, beyond anything a walking leg asks for."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class EnvConfig:

@@ -9,8 +9,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
-from gaitshift.command import Command
-from gaitshift.env.config import ACTION_LIMIT, EnvConfig
+from gaitshift.command import ACTION_LIMIT, Command
+from gaitshift.env.config import EnvConfig
 from gaitshift.motion import Motion
 from gaitshift.observation import Observation, Situation
 from gaitshift.reward import walk_reward, with_bonus

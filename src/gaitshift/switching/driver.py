@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.command import Command
+from gaitshift.command import ACTION_LIMIT, Command
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
 from gaitshift.observation import Situation
@@ -57,6 +57,7 @@ class Driver:
 
     def switch(self, ids: Int[np.ndarray, " K"], gait: str, motion: Motion) -> None:
         """Robots `ids` take up another gait at once; those already in it are left alone."""
+        self._check_known(gait)
         index = self.gaits.index(gait)
         ids = ids[self.gait[ids] != index]
         self.gait[ids] = index
@@ -78,6 +79,7 @@ class Driver:
                 stance=policy.robot.stance_angles,
             )
             action = policy(policy.observation(situation)).astype(np.float64)
+            action = np.clip(action, -ACTION_LIMIT, ACTION_LIMIT)
             self._last_action[ids] = action
             target[ids] = policy.target(action)
         return target
@@ -93,11 +95,12 @@ class Driver:
         """Which robots use which gait, for the gaits in use."""
         return [(int(index), np.flatnonzero(self.gait == index)) for index in np.unique(self.gait)]
 
+    def _check_known(self, gait: str) -> None:
+        if gait not in self.policies:
+            raise GaitshiftError(f"no policy for the gait '{gait}'; known: {', '.join(self.gaits)}")
+
     def _check(self, start: str) -> None:
-        if start not in self.policies:
-            raise GaitshiftError(
-                f"no policy for the gait '{start}'; known: {', '.join(self.gaits)}"
-            )
+        self._check_known(start)
         infos = [policy.info for policy in self.policies.values()]
         for name, info in zip(self.gaits, infos, strict=True):
             if (info.robot, info.gains) != (infos[0].robot, infos[0].gains):

@@ -40,6 +40,9 @@ class HeightState:
     k: Float[np.ndarray, " N"]
     """Counter [counts] of the rule in force, 0 at the start and after each firing."""
 
+    counted: Float[np.ndarray, " N"]
+    """k as the last step held it against β, before a firing set it back: for logs."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class HeightDifference:
@@ -70,8 +73,8 @@ class HeightDifference:
     alpha_back: float = 0.035
     """α' [m], all |h_i − h_j| below it count as flat; ours: most of bound's steps on flat."""
 
-    beta_back: float = 300.0
-    """β' [counts], fire back when k exceeds it; ours: 3 s of flat steps, twice what 10 m of
+    beta_back: float = 350.0
+    """β' [counts], fire back when k exceeds it; ours: 3.5 s of flat steps, over twice what 10 m of
     `perlin:0.10` count."""
 
     frame: Literal["body", "gravity"] = "gravity"
@@ -99,7 +102,10 @@ class HeightDifference:
     def start(self, n: int) -> HeightState:
         """State of n robots of which no foot has touched yet."""
         return HeightState(
-            height=np.zeros((n, 4)), touched=np.zeros((n, 4), dtype=bool), k=np.zeros(n)
+            height=np.zeros((n, 4)),
+            touched=np.zeros((n, 4), dtype=bool),
+            k=np.zeros(n),
+            counted=np.zeros(n),
         )
 
     def step(
@@ -130,7 +136,8 @@ class HeightDifference:
 
         k = state.k + self.epsilon * np.where(shifted, all_below, above)
         fire = k > np.where(shifted, self.beta_back, self.beta)
-        return HeightState(height=height, touched=touched, k=np.where(fire, 0.0, k)), fire
+        after = HeightState(height=height, touched=touched, k=np.where(fire, 0.0, k), counted=k)
+        return after, fire
 
 
 def height_in_frame(

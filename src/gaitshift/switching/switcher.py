@@ -1,15 +1,19 @@
 """Who changes the gaits: the foot-height condition, or a schedule."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
 from gaitshift.switching.driver import Driver
 from gaitshift.switching.height_difference import HeightDifference
+
+_ROUNDING = 1e-9
+"""Times are multiples of 10 ms, give or take this [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +67,7 @@ class Autonomous:
         driver.switch(np.flatnonzero(fire & ~shifted), self.rough, motion)
         driver.switch(np.flatnonzero(fire & shifted), self.flat, motion)
         return Decision(
-            k=np.where(fire, threshold, self._state.k),
+            k=self._state.counted,
             threshold=threshold,
             foot_height=self._state.height,
         )
@@ -75,14 +79,12 @@ class Scheduled:
 
     plan: tuple[tuple[float, str], ...]
     """Times [s] and the gait that begins there, in order."""
-    done: set[int] = field(default_factory=set[int])
-    """Which entries of the plan have been carried out."""
 
     def step(self, time: float, motion: Motion, driver: Driver) -> Decision:
-        """Carries out what is due."""
-        for index, (due, gait) in enumerate(self.plan):
-            if index not in self.done and time >= due:
+        """Carries out what fell due in the control step that ends at `time`."""
+        late = time + _ROUNDING
+        for start, gait in self.plan:
+            if late - CONTROL_PERIOD < start <= late:
                 driver.switch(np.arange(driver.n), gait, motion)
-                self.done.add(index)
         nothing = np.zeros(driver.n)
         return Decision(k=nothing, threshold=nothing, foot_height=np.zeros((driver.n, 4)))

@@ -89,7 +89,12 @@ class Recipe:
     """Threads of torch; the physics takes all cores."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (("robots", 1, 65536), ("steps", 1, 100_000)):
+        for name, low, high in (
+            ("robots", 1, 65536),
+            ("steps", 1, 100_000),
+            ("checkpoint_every", 1, 1_000_000),
+            ("threads", 1, 1024),
+        ):
             value = getattr(self, name)
             if not low <= value <= high:
                 raise GaitshiftError(f"{name} = {value}: {low} to {high} would be right")

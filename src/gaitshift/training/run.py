@@ -27,6 +27,8 @@ from gaitshift.training.recipe import Recipe
 
 CONFIG, PROGRESS, CHECKPOINTS, POLICY = "config.json", "progress.csv", "checkpoints", "policy.onnx"
 
+_STRICT = cattrs.Converter(forbid_extra_keys=True)
+
 Row = dict[str, Any]
 """A line of `progress.csv`."""
 
@@ -92,12 +94,17 @@ class Run:
         try:
             config = json.loads((folder / CONFIG).read_text())
             machine = RewardMachine.from_dict(config["machine"])
-            recipe = cattrs.structure(config["recipe"], Recipe)
+            recipe = _STRICT.structure(config["recipe"], Recipe)
             run = cls(folder, machine, recipe, config["seed"], config["command"])
         except FileNotFoundError as error:
             raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
-        except (ValueError, KeyError, TypeError, cattrs.BaseValidationError) as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
+        except cattrs.BaseValidationError as error:
+            faults = "; ".join(cattrs.transform_error(error))
+            raise GaitshiftError(f"{folder / CONFIG} is damaged: {faults}") from error
+        except GaitshiftError as error:
+            raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
         checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
         if not checkpoints:
             raise GaitshiftError(f"{folder / CHECKPOINTS} holds no checkpoint to go on from")

@@ -18,6 +18,9 @@ CONTACT_FORCE = 1.0
 """A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
 value of legged_gym."""
 
+CLEAR_OF_GROUND = 20.0
+"""Height at which robots are laid out before they are set down [m]; ours."""
+
 _POSE = 7  # position and quaternion in qpos
 _TWIST = 6  # linear and angular velocity in qvel
 
@@ -95,6 +98,7 @@ class World:
         """
         qpos = np.zeros((len(ids), _POSE + 12))
         qpos[:, :2] = xy
+        qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
         qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
         qpos[:, _POSE:] = self._stance if joint_position is None else joint_position
         self._batch.reset(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
