@@ -59,7 +59,7 @@ def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
         mean = constant("mean", normalizer.mean)
         std = constant("std", normalizer.std + normalizer.eps)
         flow = node("Div", [node("Sub", [flow, mean]), std])
-    for index, layer in enumerate(cast("list[torch.nn.Module]", list(actor.mlp))):
+    for index, layer in enumerate(list(actor.mlp)):
         if isinstance(layer, torch.nn.Linear):
             weight = constant(f"weight_{index}", layer.weight)
             bias = constant(f"bias_{index}", layer.bias)
