@@ -139,7 +139,8 @@ def test_the_demo_shifts_to_the_rough_gait_on_rough_ground_and_back_after_it() -
         shifts = [(shift["from"], shift["to"]) for shift in summary["switches"]]
         assert shifts == [("trot", "bound"), ("bound", "trot")]
         assert 4.0 < summary["switches"][0]["x_m"] < 12.0 < summary["switches"][1]["x_m"] + 0.75
-        assert summary["switches"][0]["k"] == HeightDifference().beta
+        # Six pairs count at most in the step that carries k over β.
+        assert 0 < summary["switches"][0]["k"] - HeightDifference().beta <= 6
     assert log.qpos.shape[1] == 4
 
 

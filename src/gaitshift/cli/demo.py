@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import tyro
 
 from gaitshift import policy
-from gaitshift.cli.output import emit_json, emit_table, prepare_folder, progress, say
+from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import DemoConfig, run_demo
 from gaitshift.log import Log
@@ -66,10 +66,11 @@ class Demo(DemoConfig):
         """Runs, draws, and says where to look."""
         policies = {gait: policy.load(gait) for gait in self.used}
         files = (VIDEO, PICTURE, LOG, SUMMARY)
-        prepare_folder(self.out, overwrite=self.overwrite, ours=files)
+        check_folder(self.out, overwrite=self.overwrite, ours=files)
         with progress("walking") as report:
             log, summaries = run_demo(self, policies, report)
         summary = self._summary(summaries)
+        self.out.mkdir(parents=True, exist_ok=True)
         log.save(self.out / LOG)
         (self.out / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n")
         self._draw(log)

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from gaitshift import gaits, policy
-from gaitshift.cli.output import emit_json, prepare_folder, say
+from gaitshift.cli.output import check_folder, emit_json, say
 from gaitshift.reward_machine import RewardMachine, draw, mermaid
 
 
@@ -28,6 +28,9 @@ class Gaits:
         """Prints, and draws."""
         names = gaits.names() if self.gait is None else (self.gait,)
         machines = [gaits.load(name) for name in names]
+        files = tuple(f"{m.name}{ending}" for m in machines for ending in (".png", ".mmd"))
+        if self.out is not None:
+            check_folder(self.out, overwrite=self.overwrite, ours=files)
         if self.json:
             emit_json({machine.name: machine.to_dict() for machine in machines})
         elif self.gait is None:
@@ -36,15 +39,11 @@ class Gaits:
         else:
             print(mermaid(machines[0]))
         if self.out is not None:
-            self._draw(self.out, machines)
-
-    def _draw(self, folder: Path, machines: list[RewardMachine]) -> None:
-        files = tuple(f"{machine.name}{end}" for machine in machines for end in (".png", ".mmd"))
-        prepare_folder(folder, overwrite=self.overwrite, ours=files)
-        for machine in machines:
-            draw(machine, folder / f"{machine.name}.png")
-            (folder / f"{machine.name}.mmd").write_text(mermaid(machine) + "\n")
-        say(f"drawn into {folder}: {', '.join(files)}")
+            self.out.mkdir(parents=True, exist_ok=True)
+            for machine in machines:
+                draw(machine, self.out / f"{machine.name}.png")
+                (self.out / f"{machine.name}.mmd").write_text(mermaid(machine) + "\n")
+            say(f"drawn into {self.out}: {', '.join(files)}")
 
 
 def _line(machine: RewardMachine) -> str:

@@ -50,8 +50,8 @@ def progress(label: str) -> Generator[Report]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def prepare_folder(folder: Path, *, overwrite: bool, ours: tuple[str, ...]) -> None:
-    """Makes an output folder; one with content is used only with `overwrite`.
+def check_folder(folder: Path, *, overwrite: bool, ours: tuple[str, ...]) -> None:
+    """Refuses an output folder that has content, but for `overwrite`; makes nothing.
 
     Even then nothing is deleted: the files in `ours` will be replaced, others stay.
     """
@@ -62,4 +62,3 @@ def prepare_folder(folder: Path, *, overwrite: bool, ours: tuple[str, ...]) -> N
             f"{folder} exists and is not empty; give another --out, or --overwrite to replace "
             f"{', '.join(ours)} there"
         )
-    folder.mkdir(parents=True, exist_ok=True)
