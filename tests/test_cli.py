@@ -55,6 +55,11 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["demo", "--alpha", "-1"], "alpha"),
         (["demo", "--rough-gait", "trot"], "both 'trot'"),
         (["bench", "--robots", "0"], "robots from 1"),
+        (["train", "trot", "--robots", "many"], "--robots"),
+        (["demo", "--episodes", "1.5"], "invalid literal for int() with base 10: '1.5'"),
+        (["demo", "--speed", "3"], "--speed"),
+        (["evaluate"], "Missing"),
+        (["evaluat"], "evaluat"),
     ],
 )
 def test_a_fault_of_the_user_is_one_line_that_says_what_would_be_right(

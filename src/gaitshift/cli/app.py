@@ -1,6 +1,8 @@
 """Reads the command line, runs the subcommand, turns errors into one line and an exit code."""
 
+import io
 import sys
+from contextlib import redirect_stderr
 from typing import Annotated
 
 import tyro
@@ -28,17 +30,7 @@ INTERRUPTED = 130
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line; ends the process with 0, 2 (bad input) or 130 (Ctrl-C)."""
     try:
-        command: Command = tyro.cli(
-            Command,  # pyright: ignore[reportArgumentType]  (tyro takes unions of annotated types)
-            prog="gaitshift",
-            description=(
-                "Quadruped gaits as reward machines, trained in minutes on a CPU, and shifted by "
-                "the robot itself."
-            ),
-            args=arguments,
-            config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
-        )
-        command.run()
+        _parse(arguments).run()
     except GaitshiftError as error:
         say(f"gaitshift: {error}")
         sys.exit(2)
@@ -47,3 +39,31 @@ def main(arguments: list[str] | None = None) -> None:
         sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.exit(0)
+
+
+def _parse(arguments: list[str] | None) -> Command:
+    """The command that the arguments ask for; `GaitshiftError` where they cannot be read."""
+    said = io.StringIO()
+    try:
+        with redirect_stderr(said):
+            return tyro.cli(
+                Command,  # pyright: ignore[reportArgumentType]  (a union of annotated types)
+                prog="gaitshift",
+                description=(
+                    "Quadruped gaits as reward machines, trained in minutes on a CPU, and shifted "
+                    "by the robot itself."
+                ),
+                args=arguments,
+                config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
+            )
+    except SystemExit as end:
+        if end.code:
+            raise GaitshiftError(_first_part(said.getvalue())) from None
+        raise
+
+
+def _first_part(box: str) -> str:
+    """What a box of tyro's says above its first rule, as one line."""
+    lines = [line.strip("│ ") for line in box.splitlines()[1:]]
+    rule = next((i for i, line in enumerate(lines) if line.startswith(("─", "╰"))), len(lines))
+    return f"{' '.join(line for line in lines[:rule] if line)}; --help tells more"
