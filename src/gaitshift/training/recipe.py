@@ -83,7 +83,7 @@ class Recipe:
     """Iteration at which the guards ask for their swing height."""
     swing_share: float = 1.0
     """Share of the swing height that they ask for then; 0: none, as in the paper."""
-    checkpoint_every: int = 25
+    checkpoint_every: int = 50
     """Iterations between two checkpoints."""
     threads: int = 2
     """Threads of torch; the physics takes all cores."""
