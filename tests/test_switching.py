@@ -164,7 +164,7 @@ def test_a_batch_of_robots_is_driven_as_each_alone_would_be(policies):
             forward_speed=np.array([1.2, 0.8, 0.4, 1.0]), yaw_rate=np.array([0.1, -0.2, 0.3, 0.0])
         )
         target = driver.act(motion, command)
-        driver.see(motion)
+        driver.see(motion, command)
         for robot, one in enumerate(alone):
             ids = np.array([robot])
             own = one.act(motion.of(ids), command.of(ids))
@@ -233,7 +233,7 @@ def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_act
     motion = motion_of(["FR BL", "BL BR"])
     command = Command(forward_speed=np.array([1.2, 0.5]), yaw_rate=np.array([0.2, -0.1]))
     first = driver.act(motion, command)
-    driver.see(motion)
+    driver.see(motion, command)
     driver.switch(np.array([1]), "bound", motion)
     bound = policies["bound"]
     shown = Situation(
@@ -314,7 +314,7 @@ def walk_the_timeline(policies):
     switcher = Autonomous(CONDITION, 2, flat="trot", rough="bound")
     for step, row in enumerate(TIMELINE):
         motion = motion_of(["FL FR BL BR"] * 2, np.array([row[0], row[4]]))
-        driver.see(motion)
+        driver.see(motion, command)
         decision = switcher.step((step + 1) / 100, motion, driver)
         yield row, driver, decision
 

@@ -1,4 +1,4 @@
-"""What a robot is asked to do: a forward speed and a yaw rate, and the loop that keeps a line."""
+"""What a robot is asked to do: speed, yaw rate, stride frequency; and the loop that keeps a line."""
 
 from dataclasses import dataclass
 
@@ -16,6 +16,10 @@ PAPER_SPEED = 1.2
 """Commanded forward speed v_d [m/s] (paper III-C)."""
 
 
+MOST_SPEED = 3.0
+"""Greatest speed that may be asked for [m/s]; ours: a joint at its limit swings a leg this fast."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Command:
     """What each of N robots is asked to do at one instant."""
@@ -24,15 +28,32 @@ class Command:
     """Wanted base velocity along body x [m/s]."""
     yaw_rate: Float[np.ndarray, " N"]
     """Wanted base angular velocity about body z [rad/s]."""
+    stride_frequency: Float[np.ndarray, " N"]
+    """Wanted cycles of the gait's machine a second [Hz]."""
+
+    @property
+    def stride(self) -> Float[np.ndarray, " N"]:
+        """Wanted time of a cycle [control steps]."""
+        return 1.0 / (self.stride_frequency * CONTROL_PERIOD)
 
     def of(self, ids: Int[np.ndarray, " K"]) -> "Command":
         """The command of some of the robots, in the order of `ids`."""
-        return Command(forward_speed=self.forward_speed[ids], yaw_rate=self.yaw_rate[ids])
+        return Command(
+            forward_speed=self.forward_speed[ids],
+            yaw_rate=self.yaw_rate[ids],
+            stride_frequency=self.stride_frequency[ids],
+        )
 
     @classmethod
-    def straight(cls, n: int, forward_speed: float = PAPER_SPEED) -> "Command":
-        """Straight ahead at one speed [m/s] for n robots: the paper's only command."""
-        return cls(forward_speed=np.full(n, float(forward_speed)), yaw_rate=np.zeros(n))
+    def straight(
+        cls, n: int, forward_speed: float = PAPER_SPEED, stride_frequency: float = 2.5
+    ) -> "Command":
+        """Straight ahead for n robots at one speed [m/s] and stride frequency [Hz]."""
+        return cls(
+            forward_speed=np.full(n, float(forward_speed)),
+            yaw_rate=np.zeros(n),
+            stride_frequency=np.full(n, float(stride_frequency)),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,8 +46,8 @@ class Log:
     """Whether the contacts are a stance set of that gait's machine."""
     fallen: Bool[np.ndarray, "T N"]
     """Whether the robot has fallen by now; it lies where it fell, and counts no more."""
-    command: Float[np.ndarray, "T N 2"]
-    """Commanded forward speed [m/s] and yaw rate [rad/s]."""
+    command: Float[np.ndarray, "T N 3"]
+    """Commanded forward speed [m/s], yaw rate [rad/s] and stride frequency [Hz]."""
     gaits: tuple[str, ...]
     """Names of the gaits."""
     robot: str

@@ -75,6 +75,7 @@ _SLICES: dict[str, _Slice] = {
     "contact": _Slice(4, lambda s: s.motion.contact, (MIRRORED_LEGS, (1,) * 4)),
     "forward_speed_command": _column(lambda s: s.command.forward_speed),
     "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
+    "stride_command": _column(lambda s: STEP_SCALE * s.command.stride / 2),
     "last_action": _Slice(12, lambda s: s.last_action, JOINT_MIRROR),
 }
 
@@ -91,7 +92,13 @@ PAPER_SLICES = (
 )
 """(u, δ, q, q̇, z, φ, v, ω, f); φ is the direction of gravity, which knows roll and pitch only."""
 
-DEFAULT_SLICES = (*PAPER_SLICES, "forward_speed_command", "yaw_rate_command", "last_action")
+DEFAULT_SLICES = (
+    *PAPER_SLICES,
+    "forward_speed_command",
+    "yaw_rate_command",
+    "stride_command",
+    "last_action",
+)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from gaitshift.observation import Observation
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ROBOTS, Robot
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 """Raised when a file of an earlier version could be misread."""
 
 _SHIPPED = Path(__file__).parent / "policies"
@@ -45,7 +45,13 @@ class PolicyInfo:
     control_rate: float
     """Control steps a second [Hz]."""
     forward_speed: float
-    """The forward speed it was trained for [m/s]."""
+    """The forward speed it is at home at [m/s]."""
+    speed_range: list[float]
+    """Least and greatest forward speed that it was trained for [m/s]."""
+    stride_frequency: float
+    """The stride frequency it is at home at [Hz]."""
+    stride_frequency_range: list[float]
+    """Least and greatest stride frequency that it was trained for [Hz]."""
     training: dict[str, Any]
     """Command, seed, versions and figures of the training that made it."""
     format_version: int = FORMAT_VERSION

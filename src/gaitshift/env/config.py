@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from gaitshift.command import PAPER_SPEED, HeadingLoop
+from gaitshift.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
 from gaitshift.errors import GaitshiftError
 from gaitshift.observation import DEFAULT_SLICES, PAPER_SLICES
 from gaitshift.reward import RewardConfig
@@ -23,13 +23,16 @@ class EnvConfig:
     """Preset of the robot's joint gains."""
     episode_steps: int = 1000
     """Control steps until an episode is cut (10 s); ours, the paper gives none."""
-    forward_speed: float = PAPER_SPEED
-    """Commanded speed along body x [m/s] (paper III-C)."""
+    forward_speed: float | None = None
+    """Commanded speed along body x where none is drawn [m/s]; None: the gait's own."""
+    command_share: float = 0.6
+    """Share of the draws of a command that are uniform in the gait's ranges of speed and stride
+    frequency, each by itself; the others are the gait's own. 0: always its own. Ours."""
     heading_range: float = 0.8
     """Wanted headings are drawn within ± this of the present line [rad]; 0 leaves the yaw-rate
     command at zero, as in the paper. Ours."""
-    heading_interval: int = 300
-    """Control steps between two draws of the wanted heading; ours."""
+    command_interval: int = 300
+    """Control steps between two draws of the wanted heading, speed and stride frequency; ours."""
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
     """Turns the wanted heading into the yaw-rate command."""
     joint_noise: float = 0.1
@@ -42,14 +45,23 @@ class EnvConfig:
     def __post_init__(self) -> None:
         if self.episode_steps < 1:
             raise GaitshiftError(f"episode of {self.episode_steps} steps: at least 1 is needed")
-        if not 0 <= self.forward_speed <= 3:
+        if self.forward_speed is not None and not 0 <= self.forward_speed <= MOST_SPEED:
             raise GaitshiftError(
-                f"commanded speed {self.forward_speed} m/s: 0 to 3 m/s would be right"
+                f"commanded speed {self.forward_speed} m/s: 0 to {MOST_SPEED:g} m/s would be right"
             )
+        if not 0 <= self.command_share <= 1:
+            raise GaitshiftError(f"command_share {self.command_share}: 0 to 1 would be right")
+        if self.command_interval < 1:
+            raise GaitshiftError(f"command_interval {self.command_interval}: at least 1, please")
 
     @classmethod
     def paper(cls) -> "EnvConfig":
         """The paper's environment: Table I and b alone, its S, its gains, no heading command."""
         return cls(
-            reward=RewardConfig.paper(), observed=PAPER_SLICES, gains="paper", heading_range=0.0
+            reward=RewardConfig.paper(),
+            observed=PAPER_SLICES,
+            gains="paper",
+            forward_speed=PAPER_SPEED,
+            command_share=0.0,
+            heading_range=0.0,
         )

@@ -1,5 +1,6 @@
 """The environment: one control step, told as the paper tells it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
-from gaitshift.command import ACTION_LIMIT, Command
+from gaitshift.command import ACTION_LIMIT, CONTROL_PERIOD, Command
 from gaitshift.env.config import EnvConfig
 from gaitshift.motion import Motion
 from gaitshift.observation import Observation, Situation
@@ -36,7 +37,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def __init__(
         self,
         machine: RewardMachine,
-        terrain: Terrain,
+        terrain: Terrain | Sequence[Terrain],
         num_envs: int = 1,
         *,
         config: EnvConfig | None = None,
@@ -49,8 +50,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.num_envs = num_envs
         self.observe = Observation(machine, self.config.observed)
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
-        self.swing_scale = 1.0
-        """The share of the machine's swing heights that its guards ask for now, 0 to 1."""
+        self.strictness = 1.0
+        """How much of what only a clean gait can give is asked for now, 0 to 1: factor on the swing
+        heights of the machine's guards and on the price of a touchdown."""
+        self.command_scale = 1.0
+        """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
             -np.inf, np.inf, (self.observe.size,), np.float32
@@ -82,13 +86,15 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """One control step of 10 ms; `actions` scale to joint targets about the stance."""
         action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         self.world.push(self._pusher.step())
+        stood = self.world.motion.contact
         motion = self.world.step(self._stance + self.robot.action_scale * action)
         self._state, changed, bonus = self.machine.step(
             self._state,
             motion.contact,
             motion.clearance,
             self._steps_in_state,
-            swing_scale=self.swing_scale,
+            dwell=self.machine.dwell_for(self._command.stride),
+            swing_scale=self.strictness,
         )
         self._steps_in_state = np.where(changed, 0, self._steps_in_state + 1)
         agreement = self.machine.agreement(self._state, motion.contact)
@@ -98,6 +104,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             self._command,
             stance=self._stance,
             agreement=agreement,
+            touchdowns=self.strictness * (motion.contact & ~stood).sum(axis=1),
             action_change=action - self._last_action,
         )
         reward = with_bonus(self.config.reward, np.sum(list(terms.values()), axis=0), bonus)
@@ -115,8 +122,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         observation = self._next_observation(terminated | truncated, info)
         return observation, reward, terminated, truncated, info
 
-    def set_terrain(self, terrain: Terrain) -> None:
-        """Exchanges the ground under the robots, which go on as they moved."""
+    def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
+        """Exchanges the ground under the robots, which go on as they moved.
+
+        Several grounds are shared out as in `World`; they cover the same rectangle.
+        """
         self.world.set_terrain(terrain)
 
     def push_at_most(self, force: float) -> None:
@@ -138,7 +148,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._line: Float[np.ndarray, " N"] = np.zeros(n)
         self._heading: Float[np.ndarray, " N"] = np.zeros(n)
-        self._command = Command.straight(n, self.config.forward_speed)
+        self._command = self._own_command(n)
 
     def _next_observation(self, done: Bool[np.ndarray, " N"], info: dict[str, Any]) -> Observations:
         self._update_command()
@@ -169,6 +179,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._age[ids] = 0
         self._last_action[ids] = 0.0
         self._line[ids] = self._heading[ids] = yaw
+        self._draw_commands(ids)
         self._update_command()
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
@@ -188,15 +199,57 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         return ~terrain.contains(motion.base_position_w[:, :2], self.config.terrain_margin)
 
     def _update_command(self) -> None:
+        """Draws commands that are due anew, and turns every robot towards its heading."""
         config = self.config
-        if config.heading_range == 0:
-            return
-        due = np.flatnonzero(self._age % config.heading_interval == config.heading_interval - 1)
-        if due.size:
+        due = np.flatnonzero(self._age % config.command_interval == config.command_interval - 1)
+        if due.size and config.heading_range > 0:
             turn = self._rng.uniform(-config.heading_range, config.heading_range, due.size)
             self._heading[due] = self._line[due] + turn
-        yaw_rate = config.heading_loop.yaw_rate(self.world.motion.yaw, self._heading)
-        self._command = Command(forward_speed=self._command.forward_speed, yaw_rate=yaw_rate)
+        if due.size:
+            self._draw_commands(due)
+        if config.heading_range > 0:
+            yaw_rate = config.heading_loop.yaw_rate(self.world.motion.yaw, self._heading)
+            self._command = replace(self._command, yaw_rate=yaw_rate)
+
+    def commands(self) -> dict[str, Any]:
+        """What may be commanded: own value and range of forward speed and stride frequency."""
+        own, machine = self._own_command(1), self.machine
+        speed, frequency = float(own.forward_speed[0]), float(own.stride_frequency[0])
+        slow, fast = (1.0 / (machine.stride(d) * CONTROL_PERIOD) for d in machine.dwell_range[::-1])
+        varied = self.config.command_share > 0
+        return {
+            "forward_speed": speed,
+            "speed_range": list(machine.speed_range) if varied else [speed, speed],
+            "stride_frequency": frequency,
+            "stride_frequency_range": [slow, fast] if varied else [frequency, frequency],
+        }
+
+    def _own_command(self, n: int) -> Command:
+        """Straight ahead, at the gait's own speed and frequency but for what the config says."""
+        machine, speed = self.machine, self.config.forward_speed
+        frequency = 1.0 / (machine.stride() * CONTROL_PERIOD)
+        return Command.straight(n, machine.speed if speed is None else speed, frequency)
+
+    def _draw_commands(self, ids: Int[np.ndarray, " K"]) -> None:
+        """Gives these robots a speed and a stride frequency, each drawn or the gait's own."""
+        share, scale = self.config.command_share, self.command_scale
+        if share == 0 or scale == 0:
+            return
+        machine, rng, own = self.machine, self._rng, self._own_command(len(ids))
+        drawn = rng.random((2, len(ids))) < share
+        home = own.forward_speed
+        speed = rng.uniform(*machine.speed_range, len(ids))
+        low, high = machine.dwell_range
+        dwell = machine.dwell + scale * (rng.uniform(low, high, len(ids)) - machine.dwell)
+        strides = np.array([machine.stride(d) for d in np.rint(dwell).astype(int)])
+        speeds, frequencies = (
+            getattr(self._command, name).copy() for name in ("forward_speed", "stride_frequency")
+        )
+        speeds[ids] = np.where(drawn[0], home + scale * (speed - home), home)
+        frequencies[ids] = np.where(
+            drawn[1], 1.0 / (strides * CONTROL_PERIOD), own.stride_frequency
+        )
+        self._command = replace(self._command, forward_speed=speeds, stride_frequency=frequencies)
 
     def _observation(self) -> Observations:
         return self.observe(

@@ -34,6 +34,10 @@ class EvaluationConfig:
     """Robots, each running one episode, all at once."""
     seconds: float = 10.0
     """Length of an episode [s]."""
+    speed: float | None = None
+    """Commanded forward speed [m/s]; the gait's own by default."""
+    stride_frequency: float | None = None
+    """Commanded stride frequency [Hz]; the gait's own by default."""
     push: float = 0.0
     """Largest push on the base, 0.2 s long, every 2 s [N]."""
     seed: int = 0
@@ -57,11 +61,13 @@ def evaluate(
     rng = np.random.default_rng(config.seed)
     run = RolloutConfig(
         seconds=config.seconds,
-        speed=policy.info.forward_speed,
+        speed=config.speed,
+        stride_frequency=config.stride_frequency,
         push=PushConfig(force=config.push),
     )
     driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
-    world = World(policy.robot, _grounds(config, run), config.episodes, gains=policy.info.gains)
+    speed = policy.info.forward_speed if config.speed is None else config.speed
+    world = World(policy.robot, _grounds(config, speed), config.episodes, gains=policy.info.gains)
     start = np.zeros((config.episodes, 2))
     # Spread over the width, so that robots on one field do not walk over the same ground.
     start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, config.episodes)
@@ -70,8 +76,8 @@ def evaluate(
     return measure(log, machines, mass=robot_mass(policy.robot.name)), log
 
 
-def _grounds(config: EvaluationConfig, run: RolloutConfig) -> list[Terrain]:
-    length = 2 * RUN_UP + 1.25 * run.speed * run.seconds
+def _grounds(config: EvaluationConfig, speed: float) -> list[Terrain]:
+    length = 2 * RUN_UP + 1.25 * speed * config.seconds
     first = from_spec(config.terrain, seed=config.seed, length=length, width=FIELD_WIDTH)
     if first.is_flat:
         return [first.moved(-RUN_UP, 0.0)]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.command import CONTROL_PERIOD, PAPER_SPEED, Command, HeadingLoop
+from gaitshift.command import CONTROL_PERIOD, Command, HeadingLoop
 from gaitshift.log import Log
 from gaitshift.motion import Motion
 from gaitshift.switching import Decision, Driver, Switcher
@@ -19,8 +19,10 @@ class RolloutConfig:
 
     seconds: float
     """Length of the run [s]."""
-    speed: float = PAPER_SPEED
-    """Commanded forward speed [m/s]."""
+    speed: float | None = None
+    """Commanded forward speed [m/s]; None: that of each robot's gait."""
+    stride_frequency: float | None = None
+    """Commanded stride frequency [Hz]; None: that of each robot's gait."""
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
     """Keeps robots on their line along x."""
     push: PushConfig = field(default_factory=PushConfig)
@@ -57,19 +59,19 @@ def rollout(
     pusher = Pusher(config.push, n, rng)
     recorder = _Recorder(world, driver)
     fallen = np.zeros(n, dtype=bool)
-    command = _command(config, world.motion, start_xy)
+    command = _command(config, world.motion, driver, start_xy)
     for step in range(config.steps):
         target = driver.act(world.motion, command)
         target[fallen] = stance
         world.push(pusher.step())
         motion = world.step(target)
         fallen = fallen | motion.body_contact
-        driver.see(motion)
+        driver.see(motion, command)
         decision = None
         if switcher is not None:
             decision = switcher.step((step + 1) * CONTROL_PERIOD, motion, driver)
         recorder.add(motion, command, decision, fallen)
-        command = _command(config, motion, start_xy)
+        command = _command(config, motion, driver, start_xy)
         if step % 25 == 24:
             report(step + 1, config.steps)
             if (fallen | (motion.base_position_w[:, 0] > finish_x)).all():
@@ -78,10 +80,17 @@ def rollout(
     return recorder.log()
 
 
-def _command(config: RolloutConfig, motion: Motion, start_xy: Float[np.ndarray, "N 2"]) -> Command:
+def _command(
+    config: RolloutConfig, motion: Motion, driver: Driver, start_xy: Float[np.ndarray, "N 2"]
+) -> Command:
+    own, n = driver.own_command(), driver.n
     lateral = motion.base_position_w[:, 1] - start_xy[:, 1]
-    yaw_rate = config.heading_loop.yaw_rate(motion.yaw, np.zeros(len(lateral)), lateral)
-    return Command(forward_speed=np.full(len(lateral), config.speed), yaw_rate=yaw_rate)
+    speed, frequency = config.speed, config.stride_frequency
+    return Command(
+        forward_speed=own.forward_speed if speed is None else np.full(n, speed),
+        yaw_rate=config.heading_loop.yaw_rate(motion.yaw, np.zeros(n), lateral),
+        stride_frequency=own.stride_frequency if frequency is None else np.full(n, frequency),
+    )
 
 
 class _Recorder:
@@ -116,7 +125,9 @@ class _Recorder:
             "machine_state": driver.machine_state.copy(),
             "stance_shown": driver.stance_shown(motion),
             "fallen": fallen.copy(),
-            "command": np.stack([command.forward_speed, command.yaw_rate], axis=1),
+            "command": np.stack(
+                [command.forward_speed, command.yaw_rate, command.stride_frequency], axis=1
+            ),
         }
         for name, value in row.items():
             self._columns.setdefault(name, []).append(value)

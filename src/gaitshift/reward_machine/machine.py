@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from gaitshift.command import MOST_SPEED, PAPER_SPEED
 from gaitshift.errors import GaitshiftError
 from gaitshift.legs import LABEL_COUNT, LEGS, MIRRORED_LEGS, label_of
 from gaitshift.reward_machine.check import check
+from gaitshift.reward_machine.cycle import cycle, shares, stride, touchdowns
 from gaitshift.reward_machine.edge import Edge
 from gaitshift.reward_machine.guard import check_dwell, check_swing_height
 from gaitshift.reward_machine.lookup import Lookup
@@ -24,6 +26,9 @@ _KEYS = (
     "title",
     "description",
     "dwell",
+    "dwell_range",
+    "speed",
+    "speed_range",
     "swing_height",
     "ideal_phase",
     "state",
@@ -74,6 +79,15 @@ class RewardMachine:
     ideal_phase: tuple[float, float, float, float]
     """Touchdown of each foot in `LEGS` [fraction of the stride, 0 to below 1]: the gait's norm."""
 
+    dwell_range: tuple[int, int]
+    """Least and greatest dwell that may be commanded [control steps]: the gait's frequencies."""
+
+    speed: float
+    """Forward speed at which the gait is at home [m/s]."""
+
+    speed_range: tuple[float, float]
+    """Least and greatest forward speed that may be commanded [m/s]."""
+
     def __post_init__(self):
         if not _NAME.fullmatch(self.name):
             raise GaitshiftError(
@@ -83,6 +97,16 @@ class RewardMachine:
         for leg, phase in zip(LEGS, self.ideal_phase, strict=True):
             if not 0 <= phase < 1:
                 raise GaitshiftError(f"ideal_phase: {leg} must be 0 to below 1, not {phase:g}")
+        for name, own in (("dwell", self.dwell), ("speed", self.speed)):
+            low, high = getattr(self, f"{name}_range")
+            if not 0 <= low <= own <= high:
+                raise GaitshiftError(
+                    f"{name}_range must be two numbers, rising, with {name} = {own:g} in between,"
+                    f" not {low:g} to {high:g}"
+                )
+        if not self.speed_range[1] <= MOST_SPEED:
+            raise GaitshiftError(f"speed_range must end at {MOST_SPEED:g} m/s or below")
+        check_dwell(self.dwell_range[1])
         check(self.states, self.edges)
 
     @property
@@ -164,6 +188,26 @@ class RewardMachine:
         """
         return self._lookup.agreement[state * LABEL_COUNT + label_of(contact)]
 
+    @property
+    def cycle(self) -> tuple[int, ...]:
+        """The edges from the first state back to it, as numbers in `edges`."""
+        return cycle(self.states, self.edges)
+
+    @property
+    def touchdowns(self) -> tuple[int, int, int, int]:
+        """How often each foot comes down on one cycle when every stance is shown exactly."""
+        return touchdowns(self.states, self.edges)
+
+    def stride(self, dwell: int | None = None) -> int:
+        """Least time of one cycle at a dwell, the machine's own if None [control steps]."""
+        return stride(self._shares, self.dwell if dwell is None else dwell)
+
+    def dwell_for(self, stride: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+        """The dwell in `dwell_range` whose cycle comes nearest to `stride` [control steps]."""
+        low, high = self.dwell_range
+        strides = self._stride_of_dwell[low : high + 1]
+        return low + np.abs(np.asarray(stride)[:, None] - strides).argmin(axis=1)
+
     def mirrored(self) -> "RewardMachine":
         """Return the machine of the robot seen in a mirror; feet in names of states change too."""
         phase = self.ideal_phase
@@ -175,6 +219,9 @@ class RewardMachine:
             states=tuple(state.mirrored() for state in self.states),
             edges=tuple(edge.mirrored() for edge in self.edges),
             dwell=self.dwell,
+            dwell_range=self.dwell_range,
+            speed=self.speed,
+            speed_range=self.speed_range,
             ideal_phase=(phase[a], phase[b], phase[c], phase[d]),
         )
 
@@ -192,6 +239,9 @@ class RewardMachine:
             "title": self.title,
             "description": self.description,
             "dwell": self.dwell,
+            "dwell_range": list(self.dwell_range),
+            "speed": self.speed,
+            "speed_range": list(self.speed_range),
             "ideal_phase": dict(zip(LEGS, self.ideal_phase, strict=True)),
             "state": [state.to_dict() for state in self.states],
             "transition": [edge.to_dict() for edge in self.edges],
@@ -208,6 +258,10 @@ class RewardMachine:
         check_dwell(dwell)
         swing_height = table.number("swing_height", default=0.0)
         check_swing_height(swing_height)
+        speed = table.number("speed", default=PAPER_SPEED)
+        dwell_range = table.pair("dwell_range", default=(dwell, dwell))
+        if not all(end == int(end) for end in dwell_range):
+            raise GaitshiftError("dwell_range must be two whole numbers of control steps")
         with located("ideal_phase"):
             phases = Table(table.get("ideal_phase"), keys=LEGS)
             fl, fr, bl, br = (phases.number(leg) for leg in LEGS)
@@ -224,8 +278,19 @@ class RewardMachine:
                 for number, one in enumerate(table.tables("transition"), start=1)
             ),
             dwell=dwell,
+            dwell_range=(int(dwell_range[0]), int(dwell_range[1])),
+            speed=speed,
+            speed_range=table.pair("speed_range", default=(speed, speed)),
             ideal_phase=(fl, fr, bl, br),
         )
+
+    @cached_property
+    def _shares(self) -> tuple[float, ...]:
+        return shares(self.states, self.edges, self.dwell)
+
+    @cached_property
+    def _stride_of_dwell(self) -> Int[np.ndarray, " D"]:
+        return np.array([stride(self._shares, dwell) for dwell in range(self.dwell_range[1] + 1)])
 
     @cached_property
     def _lookup(self) -> Lookup:

@@ -82,6 +82,14 @@ class Table:
         except OverflowError:
             raise _wrong(key, "a number of a usual size", value) from None
 
+    def pair(self, key: str, *, default: tuple[float, float]) -> tuple[float, float]:
+        """Return two numbers, the lower and the upper end of a range."""
+        ends = self._list(key, "two numbers, such as [0.4, 1.6]") if self.has(key) else [*default]
+        if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
+            raise _wrong(key, "two numbers, such as [0.4, 1.6]", ends)
+        low, high = cast(list[float], ends)
+        return float(low), float(high)
+
     def feet(self, key: str) -> Feet:
         """Return a list of feet, each named once."""
         names = self._list(key, 'a list of feet, such as ["FL", "BR"]')

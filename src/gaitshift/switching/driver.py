@@ -43,14 +43,19 @@ class Driver:
         """The preset of joint gains that all policies were trained with."""
         return next(iter(self.policies.values())).info.gains
 
-    def see(self, motion: Motion) -> None:
-        """Moves every robot's machine on by what its feet did in the step that ended."""
+    def see(self, motion: Motion, command: Command) -> None:
+        """Moves every robot's machine on by what its feet did in the step that ended.
+
+        `command` is the one that the robots acted on.
+        """
+        stride = command.stride
         for index, ids in self._groups():
             state, changed, _ = self._machines[index].step(
                 self.machine_state[ids],
                 motion.contact[ids],
                 motion.clearance[ids],
                 self.steps_in_state[ids],
+                dwell=self._machines[index].dwell_for(stride[ids]),
             )
             self.machine_state[ids] = state
             self.steps_in_state[ids] = np.where(changed, 0, self.steps_in_state[ids] + 1)
@@ -83,6 +88,16 @@ class Driver:
             self._last_action[ids] = action
             target[ids] = policy.target(action)
         return target
+
+    def own_command(self) -> Command:
+        """Straight ahead, each robot at the speed and stride frequency its gait is at home at."""
+        speed = np.array([policy.info.forward_speed for policy in self.policies.values()])
+        frequency = np.array([policy.info.stride_frequency for policy in self.policies.values()])
+        return Command(
+            forward_speed=speed[self.gait],
+            yaw_rate=np.zeros(self.n),
+            stride_frequency=frequency[self.gait],
+        )
 
     def stance_shown(self, motion: Motion) -> Bool[np.ndarray, " N"]:
         """Whether the feet in contact are a stance set of each robot's present gait."""

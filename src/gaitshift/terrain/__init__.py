@@ -3,7 +3,7 @@
 from gaitshift.terrain.height_field import Section, Terrain
 from gaitshift.terrain.pebbles import pebbles
 from gaitshift.terrain.perlin import perlin
-from gaitshift.terrain.shapes import flat, slope, stairs, step
+from gaitshift.terrain.shapes import bank, flat, slope, stairs, step
 from gaitshift.terrain.spec import KINDS, Kind, from_spec, spec_help
 from gaitshift.terrain.track import track
 from gaitshift.terrain.unit_interval import UnitField, to_unit_interval
@@ -14,6 +14,7 @@ __all__ = [
     "Section",
     "Terrain",
     "UnitField",
+    "bank",
     "flat",
     "from_spec",
     "pebbles",

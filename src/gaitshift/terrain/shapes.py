@@ -1,4 +1,6 @@
-"""Ground that is the same across y: flat, a slope, stairs, one step."""
+"""Planes and edges: flat ground, a slope, a bank, stairs, one step."""
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -36,16 +38,33 @@ def slope(
     *,
     length: float,
     width: float,
+    towards: float = 0.0,
     cell: float = CELL,
     origin: tuple[float, float] | None = None,
 ) -> Terrain:
-    """Plane that rises along +x by `degrees` from z = 0 at its first column; negative: downhill.
+    """Plane that rises by `degrees` in the direction `towards` [degrees from +x to +y].
 
-    `GaitshiftError` beyond 45°.
+    It is at z = 0 in the middle of its first column; negative: downhill. `GaitshiftError` beyond
+    45°.
     """
     grid = Grid(length=length, width=width, cell=cell)
-    height = np.tan(np.radians(INCLINE.check(degrees))) * grid.x
+    ahead, left = np.cos(np.radians(towards)), np.sin(np.radians(towards))
+    along = ahead * grid.x + left * (grid.y - width / 2)[:, None]
+    height = np.tan(np.radians(INCLINE.check(degrees))) * along
     return grid.terrain(height, name=spell("slope", degrees), origin=origin)
+
+
+def bank(
+    degrees: float,
+    *,
+    length: float,
+    width: float,
+    cell: float = CELL,
+    origin: tuple[float, float] | None = None,
+) -> Terrain:
+    """Slope to walk across: it rises along +y, to the left of a robot that faces +x."""
+    plane = slope(degrees, towards=90.0, length=length, width=width, cell=cell, origin=origin)
+    return replace(plane, name=spell("bank", degrees), sections=())
 
 
 def stairs(

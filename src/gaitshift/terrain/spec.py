@@ -12,7 +12,7 @@ from gaitshift.terrain.height_field import Terrain
 from gaitshift.terrain.pebbles import PEBBLE_HEIGHT, pebbles
 from gaitshift.terrain.perlin import AMPLITUDE, perlin
 from gaitshift.terrain.quantity import Quantity
-from gaitshift.terrain.shapes import INCLINE, RISE, STEP_HEIGHT, flat, slope, stairs, step
+from gaitshift.terrain.shapes import INCLINE, RISE, STEP_HEIGHT, bank, flat, slope, stairs, step
 from gaitshift.terrain.track import track
 
 _Seed = int | np.random.Generator
@@ -67,6 +67,15 @@ KINDS = (
         cell=CELL,
         meaning="a plane rising along +x; negative: downhill",
         make=lambda number, seed, length, width, cell: slope(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="bank",
+        number=INCLINE,
+        cell=CELL,
+        meaning="a plane rising along +y, to walk across",
+        make=lambda number, seed, length, width, cell: bank(
             number, length=length, width=width, cell=cell
         ),
     ),

@@ -30,7 +30,7 @@ def describe(env: GaitEnv, training: dict[str, Any]) -> PolicyInfo:
         kp=gains.kp,
         kd=gains.kd,
         control_rate=1.0 / CONTROL_PERIOD,
-        forward_speed=env.config.forward_speed,
+        **env.commands(),
         training=training,
     )
 

@@ -1,15 +1,24 @@
-"""The ground of training: flat, then Perlin fields drawn anew every few iterations."""
+"""The ground of training: flat, then noise, slopes and stairs drawn anew every few iterations."""
 
 import numpy as np
 
-from gaitshift.terrain import Terrain, flat, perlin
+from gaitshift.terrain import Terrain, flat, perlin, slope, stairs
 from gaitshift.training.recipe import Recipe, Stage
 
 FIELD = 20.0
 """Side of a training field [m]; ours: an episode of 10 s rarely leaves it."""
 
 FIRST_SHARE = 0.3
-"""Share of a stage's amplitude that its first fields reach; it grows to 1 by the middle."""
+"""Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
+
+KINDS = ("perlin", "perlin", "perlin", "slope", "slope", "stairs")
+"""The fields that robots share out at a time; ours: half of them are the paper's noise."""
+
+STAIR_CELL = 0.05
+"""Distance between samples of stairs [m]; ours: a face leans over one of them."""
+
+STAIR_RUN = (0.30, 1.2)
+"""Shortest and longest tread of stairs [m]; ours: from a staircase to single steps."""
 
 
 def stage_at(recipe: Recipe, iteration: int) -> tuple[Stage, int]:
@@ -21,15 +30,31 @@ def stage_at(recipe: Recipe, iteration: int) -> tuple[Stage, int]:
     return recipe.stages[-1], recipe.stages[-1].iterations + iteration
 
 
-def draw_ground(stage: Stage, within: int, seed: int) -> Terrain:
-    """The ground of a stage at its iteration `within`; the same for the same numbers.
+def draw_grounds(stage: Stage, within: int, seed: int) -> tuple[Terrain, ...]:
+    """The fields of a stage at its iteration `within`; the same for the same numbers.
 
-    Amplitudes are uniform from 0 to the largest of the moment, so that gentle ground is never
-    forgotten.
+    Amplitudes and angles are drawn from 0 to the largest of the moment, so that gentle ground is
+    never forgotten.
     """
-    if stage.amplitude == 0:
-        return flat(FIELD, FIELD)
+    if not stage.is_rough:
+        return (flat(FIELD, FIELD),)
     rng = np.random.default_rng((seed, within))
     grown = min(1.0, FIRST_SHARE + (1 - FIRST_SHARE) * within / max(1, stage.iterations / 2))
-    amplitude = stage.amplitude * grown * rng.uniform(0.0, 1.0) ** 0.5
-    return perlin(amplitude, seed=rng, length=FIELD, width=FIELD)
+    return tuple(_draw(kind, stage, grown, rng) for kind in KINDS)
+
+
+def _draw(kind: str, stage: Stage, grown: float, rng: np.random.Generator) -> Terrain:
+    share = grown * rng.uniform(0.0, 1.0) ** 0.5
+    if kind == "slope":
+        towards = rng.uniform(0.0, 360.0)
+        return slope(share * stage.slope, towards=towards, length=FIELD, width=FIELD)
+    if kind == "stairs":
+        return stairs(
+            share * stage.rise,
+            run=rng.uniform(*STAIR_RUN),
+            flight=1000,
+            length=FIELD,
+            width=FIELD,
+            cell=STAIR_CELL,
+        )
+    return perlin(share * stage.amplitude, seed=rng, length=FIELD, width=FIELD)

@@ -52,11 +52,20 @@ class Stage:
     iterations: int
     """PPO iterations."""
     amplitude: float = 0.0
-    """Largest |height| of the Perlin ground at the end of the stage [m]; 0 is flat ground."""
+    """Largest |height| of the Perlin grounds at the end of the stage [m]."""
+    slope: float = 0.0
+    """Steepest slope at the end of the stage, in any direction [degrees]."""
+    rise: float = 0.0
+    """Highest stair at the end of the stage [m]."""
     redraw_every: int = 5
     """Iterations between two draws of the ground (paper III-D)."""
     push: float = 0.0
     """Largest push on the base [N]."""
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether any of its ground is not flat."""
+        return max(self.amplitude, self.slope, self.rise) > 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,20 +78,25 @@ class Recipe:
     """The algorithm."""
     stages: tuple[Stage, ...] = (
         Stage(name="flat", iterations=300),
-        Stage(name="rough", iterations=600, amplitude=0.15, push=120.0),
+        Stage(name="rough", iterations=600, amplitude=0.18, slope=14.0, rise=0.07, push=150.0),
     )
     """Flat ground, then Perlin ground with pushes (paper III-D)."""
     robots: int = 128
     """Robots in parallel; ours: a core's worth of physics a step (the paper has 30)."""
     steps: int = 24
     """Control steps of each robot in an iteration; ours (the paper has 100)."""
-    swing_from: int = 60
-    """Iteration from which the guards' swing height grows from 0; ours: asked for from the start
-    it hides the cycle from exploration."""
-    swing_until: int = 210
-    """Iteration at which the guards ask for their swing height."""
-    swing_share: float = 1.0
-    """Share of the swing height that they ask for then; 0: none, as in the paper."""
+    strict_from: int = 60
+    """Iteration from which the environment's strictness grows from 0; ours: asked for in full from
+    the start, swing heights and the price of touchdowns hide the cycle from exploration."""
+    strict_until: int = 210
+    """Iteration at which it has grown."""
+    strict_share: float = 1.0
+    """Strictness then; 0: none ever, as in the paper."""
+    command_from: int = 100
+    """Iteration from which commands spread from the gait's own; ours: first the gait, then its
+    speeds and frequencies."""
+    command_until: int = 300
+    """Iteration at which commands are drawn from all of the gait's ranges."""
     checkpoint_every: int = 50
     """Iterations between two checkpoints."""
     threads: int = 2
@@ -98,8 +112,9 @@ class Recipe:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise GaitshiftError(f"{name} = {value}: {low} to {high} would be right")
-        if not 0 <= self.swing_from < self.swing_until:
-            raise GaitshiftError("swing_from must be 0 or more and lie before swing_until")
+        for name in ("strict", "command"):
+            if not 0 <= getattr(self, f"{name}_from") < getattr(self, f"{name}_until"):
+                raise GaitshiftError(f"{name}_from must be 0 or more and lie before {name}_until")
         if any(stage.iterations < 0 for stage in self.stages) or self.iterations < 1:
             raise GaitshiftError("iterations: at least 1 would be right")
 
@@ -120,12 +135,13 @@ class Recipe:
             left -= take
         return replace(self, stages=tuple(s for s in stages if s.iterations > 0))
 
-    def swing_scale(self, iteration: int) -> float:
-        """Share of the guards' swing height asked for at this iteration."""
-        if iteration >= self.swing_until:
-            return self.swing_share
-        grown = (iteration - self.swing_from) / (self.swing_until - self.swing_from)
-        return self.swing_share * max(grown, 0.0)
+    def strictness(self, iteration: int) -> float:
+        """The environment's strictness at this iteration."""
+        return self.strict_share * _grown(iteration, self.strict_from, self.strict_until)
+
+    def command_scale(self, iteration: int) -> float:
+        """Share of the gait's ranges that commands are drawn from at this iteration."""
+        return _grown(iteration, self.command_from, self.command_until)
 
     @classmethod
     def paper(cls) -> "Recipe":
@@ -150,8 +166,13 @@ class Recipe:
             stages=(Stage(name="flat", iterations=500),),
             robots=30,
             steps=100,
-            swing_share=0.0,
+            strict_share=0.0,
         )
+
+
+def _grown(iteration: int, start: int, end: int) -> float:
+    """0 until `start`, 1 from `end` on, and a straight line in between."""
+    return min(max((iteration - start) / (end - start), 0.0), 1.0)
 
 
 PRESETS = {"default": Recipe, "paper": Recipe.paper}

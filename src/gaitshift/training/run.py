@@ -21,7 +21,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
-from gaitshift.training.ground import FIELD, draw_ground, stage_at
+from gaitshift.training.ground import FIELD, draw_grounds, stage_at
 from gaitshift.training.learner import Learner
 from gaitshift.training.recipe import Recipe
 
@@ -145,12 +145,13 @@ class Run:
         start = time.perf_counter()
         stage, within = stage_at(self.recipe, self.iteration)
         env = self.learner.env
-        if within % stage.redraw_every == 0 and (stage.amplitude > 0 or within == 0):
-            env.set_terrain(draw_ground(stage, within, self.seed))
+        if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
+            env.set_terrain(draw_grounds(stage, within, self.seed))
             env.push_at_most(stage.push)
         if self._is_checkpoint():
             self.learner.start_episodes(_seed_at(self.seed, self.iteration))
-        env.swing_scale = self.recipe.swing_scale(self.iteration)
+        env.strictness = self.recipe.strictness(self.iteration)
+        env.command_scale = self.recipe.command_scale(self.iteration)
         seen = self.learner.iterate()
         self.iteration += 1
         self._wall += time.perf_counter() - start
@@ -194,7 +195,7 @@ class Run:
         torch.set_rng_state(state["torch_rng"])
         stage, within = stage_at(self.recipe, self.iteration)
         drawn = within - within % stage.redraw_every
-        self.learner.env.set_terrain(draw_ground(stage, drawn, self.seed))
+        self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed))
         self.learner.env.push_at_most(stage.push)
 
     def _log(self, row: Row, writer: SummaryWriter) -> None:
