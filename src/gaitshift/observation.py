@@ -56,6 +56,14 @@ def _machine_slice(machine: RewardMachine) -> _Slice:
     return _Slice(count, lambda s: one_hot[s.machine_state], (mirrored, (1,) * count))
 
 
+def _wait_slice(machine: RewardMachine) -> _Slice:
+    def read(s: Situation) -> np.ndarray:
+        dwell = machine.dwell_for(s.command.stride)
+        return STEP_SCALE * machine.wait(s.machine_state, s.steps_in_state, dwell)
+
+    return _column(read)
+
+
 def _column(read: Callable[[Situation], np.ndarray], sign: int = 1) -> _Slice:
     return _Slice(1, lambda s: read(s)[:, None], ((0,), (sign,)))
 
@@ -75,9 +83,12 @@ _SLICES: dict[str, _Slice] = {
     "contact": _Slice(4, lambda s: s.motion.contact, (MIRRORED_LEGS, (1,) * 4)),
     "forward_speed_command": _column(lambda s: s.command.forward_speed),
     "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
-    "stride_command": _column(lambda s: STEP_SCALE * s.command.stride / 2),
+    "stride_command": _column(lambda s: STEP_SCALE * s.command.stride),
     "last_action": _Slice(12, lambda s: s.last_action, JOINT_MIRROR),
 }
+
+_MACHINE_SLICES = {"machine_state": _machine_slice, "wait": _wait_slice}
+"""Slices that depend on the machine."""
 
 PAPER_SLICES = (
     "machine_state",
@@ -97,6 +108,7 @@ DEFAULT_SLICES = (
     "forward_speed_command",
     "yaw_rate_command",
     "stride_command",
+    "wait",
     "last_action",
 )
 
@@ -109,7 +121,7 @@ class Observation:
     names: tuple[str, ...] = DEFAULT_SLICES
 
     def __post_init__(self) -> None:
-        known = ("machine_state", *_SLICES)
+        known = (*_MACHINE_SLICES, *_SLICES)
         unknown = [name for name in self.names if name not in known]
         if unknown:
             raise GaitshiftError(
@@ -118,8 +130,10 @@ class Observation:
 
     @cached_property
     def _parts(self) -> tuple[_Slice, ...]:
-        machine_state = _machine_slice(self.machine)
-        return tuple(machine_state if n == "machine_state" else _SLICES[n] for n in self.names)
+        return tuple(
+            _MACHINE_SLICES[n](self.machine) if n in _MACHINE_SLICES else _SLICES[n]
+            for n in self.names
+        )
 
     @cached_property
     def slices(self) -> dict[str, slice]:

@@ -37,6 +37,9 @@ class Lookup:
     dwell_parts: int
     """See `dwell_share`."""
 
+    least_share: Float[np.ndarray, " states"]
+    """Shortest dwell of the edges out of each state over the machine's own; 0 where none is."""
+
     swing_height: Float[np.ndarray, " rows"]
     """Least height of the up feet [m]."""
 
@@ -75,6 +78,13 @@ class Lookup:
             dwell=dwells,
             dwell_share=dwells if dwell else np.ones_like(dwells),
             dwell_parts=dwell or 1,
+            least_share=np.array(
+                [
+                    min((e.guard.dwell for e in edges if e.source == s.name), default=0)
+                    / (dwell or 1)
+                    for s in states
+                ]
+            ),
             swing_height=np.array([edge.guard.swing_height for edge in edges] + [0.0]),
             up=np.array([*up, [False] * len(LEGS)]),
             bonus=np.array([edge.bonus for edge in edges] + [0.0]),

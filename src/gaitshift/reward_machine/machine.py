@@ -161,6 +161,22 @@ class RewardMachine:
             bonus=np.where(changed, rows.bonus[edge], 0.0),
         )
 
+    def wait(
+        self,
+        state: Int[np.ndarray, " N"],
+        steps_in_state: Int[np.ndarray, " N"],
+        dwell: int | Int[np.ndarray, " N"] | None = None,
+    ) -> Float[np.ndarray, " N"]:
+        """Control steps until the first edge out of the state may open; 0 once it may.
+
+        Arguments are as in `step`. With the state it tells the policy what the lock-out is about:
+        the stance is to be held now, or to be changed.
+        """
+        rows = self._lookup
+        asked = self.dwell if dwell is None else dwell
+        wanted = np.ceil(rows.least_share[state] * asked - 1e-9)
+        return np.maximum(wanted - steps_in_state - 1, 0.0)
+
     def enter(self, contact: Bool[np.ndarray, "N 4"]) -> Int[np.ndarray, " N"]:
         """Return the state to start in: the stance that agrees with the contacts on most feet.
 
