@@ -1,4 +1,4 @@
-"""The reward: Table I term by term, six additions of ours, and the machine's bonus."""
+"""The reward: Table I term by term, seven additions of ours, and the machine's bonus."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -21,6 +21,7 @@ ADDITIONS = (
     "stance_feet",
     "stance_pattern",
     "slip",
+    "power",
     "touchdown",
     "action_rate",
 )
@@ -48,17 +49,19 @@ class RewardConfig:
     """Times ‖q - q_init‖² (Table I)."""
     joint_velocity: float = -0.01
     """Times ‖q̇‖² [s²] (Table I)."""
-    speed_tracking: float = 3.0
+    speed_tracking: float = 5.0
     """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: Table I's bell is so wide that a walk at 1 m/s
     in place of 1.2 m/s loses 4 % of it."""
-    stance_feet: float = 4.0
+    stance_feet: float = 8.0
     """Times the share of the feet that are, down or up, as the stance of the present state has
     them; ours: the bonus pays the instant of a change only, and this tells each foot apart."""
-    stance_pattern: float = 4.0
+    stance_pattern: float = 8.0
     """Where that share is 1; ours: else three right feet out of four would do."""
     slip: float = -0.5
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
-    touchdown: float = -10.0
+    power: float = -0.015
+    """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
+    touchdown: float = -30.0
     """Times the feet that come down in this step, and the environment's strictness; ours: a clean
     cycle has one touchdown a foot, and every bounce on top of it costs as much again."""
     action_rate: float = -0.02
@@ -119,6 +122,7 @@ def walk_reward(
         "stance_feet": config.stance_feet * agreement,
         "stance_pattern": config.stance_pattern * (agreement == 1.0),
         "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
+        "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
         "touchdown": config.touchdown * touchdowns,
         "action_rate": config.action_rate * _squares(action_change),
     }

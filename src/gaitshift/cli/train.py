@@ -35,6 +35,8 @@ class Train:
     """Robots in parallel; the recipe's by default."""
     iterations: int | None = None
     """PPO iterations in all; the recipe's by default."""
+    threads: int | None = None
+    """Threads of torch; the recipe's by default. 1 where several trainings share the machine."""
     seed: int = 0
     """Seed of networks, exploration, grounds and pushes."""
     out: Path | None = None
@@ -82,6 +84,8 @@ class Train:
         recipe = PRESETS[self.preset]()
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)
+        if self.threads is not None:
+            recipe = replace(recipe, threads=self.threads)
         if self.iterations is not None:
             recipe = recipe.with_iterations(self.iterations)
         folder = self.out or Path("runs") / f"{machine.name}-{self.seed}"

@@ -11,14 +11,14 @@ FIELD = 20.0
 FIRST_SHARE = 0.3
 """Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
 
-KINDS = ("perlin", "perlin", "perlin", "slope", "slope", "stairs")
+KINDS = ("perlin", "perlin", "perlin", "perlin", "slope", "slope", "stair", "step")
 """The fields that robots share out at a time; ours: half of them are the paper's noise."""
 
 STAIR_CELL = 0.05
 """Distance between samples of stairs [m]; ours: a face leans over one of them."""
 
-STAIR_RUN = (0.30, 1.2)
-"""Shortest and longest tread of stairs [m]; ours: from a staircase to single steps."""
+RUNS = {"stair": (0.30, 0.50), "step": (1.0, 2.5)}
+"""Shortest and longest tread [m]; ours: those of staircases, and room for strides in between."""
 
 
 def stage_at(recipe: Recipe, iteration: int) -> tuple[Stage, int]:
@@ -48,10 +48,10 @@ def _draw(kind: str, stage: Stage, grown: float, rng: np.random.Generator) -> Te
     if kind == "slope":
         towards = rng.uniform(0.0, 360.0)
         return slope(share * stage.slope, towards=towards, length=FIELD, width=FIELD)
-    if kind == "stairs":
+    if kind in RUNS:
         return stairs(
-            share * stage.rise,
-            run=rng.uniform(*STAIR_RUN),
+            share * getattr(stage, kind),
+            run=rng.uniform(*RUNS[kind]),
             flight=1000,
             length=FIELD,
             width=FIELD,

@@ -55,8 +55,10 @@ class Stage:
     """Largest |height| of the Perlin grounds at the end of the stage [m]."""
     slope: float = 0.0
     """Steepest slope at the end of the stage, in any direction [degrees]."""
-    rise: float = 0.0
-    """Highest stair at the end of the stage [m]."""
+    stair: float = 0.0
+    """Highest stairs at the end of the stage [m]."""
+    step: float = 0.0
+    """Highest single steps at the end of the stage [m]."""
     redraw_every: int = 5
     """Iterations between two draws of the ground (paper III-D)."""
     push: float = 0.0
@@ -65,7 +67,7 @@ class Stage:
     @property
     def is_rough(self) -> bool:
         """Whether any of its ground is not flat."""
-        return max(self.amplitude, self.slope, self.rise) > 0
+        return max(self.amplitude, self.slope, self.stair, self.step) > 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,8 +79,16 @@ class Recipe:
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """The algorithm."""
     stages: tuple[Stage, ...] = (
-        Stage(name="flat", iterations=300),
-        Stage(name="rough", iterations=600, amplitude=0.18, slope=14.0, rise=0.07, push=150.0),
+        Stage(name="flat", iterations=400),
+        Stage(
+            name="rough",
+            iterations=600,
+            amplitude=0.18,
+            slope=14.0,
+            stair=0.06,
+            step=0.12,
+            push=150.0,
+        ),
     )
     """Flat ground, then Perlin ground with pushes (paper III-D)."""
     robots: int = 128
