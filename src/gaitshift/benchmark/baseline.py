@@ -1,11 +1,9 @@
 """The baseline: stable-baselines3's PPO at its defaults, on the same environment (paper IV-A)."""
 
 from pathlib import Path
-from typing import cast
 
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.policies import ActorCriticPolicy
 
 from gaitshift.benchmark.vec_env import GaitVecEnv
 from gaitshift.env import GaitEnv
@@ -53,7 +51,7 @@ class Baseline:
 
     def export(self) -> Path:
         """Writes the policy as it stands."""
-        network = cast(ActorCriticPolicy, self._ppo.policy)
+        network = self._ppo.policy
         layers = [*network.mlp_extractor.policy_net, network.action_net]
         training = {"learner": "stable-baselines3", "seed": self._seed, "steps": self.steps}
         write(layers, describe(self._env, training), self._path)

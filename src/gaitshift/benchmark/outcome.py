@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
+from math import floor
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,12 @@ def ratio(ours: Outcome, baseline: Outcome) -> float | None:
     None where ours was given up: then nothing can be said.
     """
     return baseline.seconds / ours.seconds if ours.reached else None
+
+
+def ratio_text(times: float, *, is_lower_bound: bool) -> str:
+    """A ratio in two figures or more, rounded down: so a lower bound stays one."""
+    text = f"{floor(times)}" if times >= 10 else f"{floor(10 * times) / 10:.1f}"
+    return f"> {text}" if is_lower_bound else text
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:

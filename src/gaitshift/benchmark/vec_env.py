@@ -1,11 +1,10 @@
 """A `GaitEnv` as stable-baselines3 wants its environments."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from gaitshift.env import GaitEnv
 
@@ -32,7 +31,7 @@ class GaitVecEnv(VecEnv):
         """Keeps the actions for `step_wait`."""
         self._actions = actions
 
-    def step_wait(self) -> VecEnvStepReturn:
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """One control step of all robots."""
         observation, reward, terminated, truncated, info = self.env.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
@@ -61,6 +60,6 @@ class GaitVecEnv(VecEnv):
         """Robots share one environment, which has no methods of theirs alone."""
         raise NotImplementedError
 
-    def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> Sequence[bool]:  # pyright: ignore
+    def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
         """No robot has a wrapper."""
         return [False for _ in self._get_indices(indices)]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from gaitshift.benchmark.outcome import Outcome, summary, write_csv
+from gaitshift.benchmark.outcome import Outcome, ratio_text, summary, write_csv
 from gaitshift.benchmark.speed import SpeedConfig, environment_speed, training_speed
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
 
@@ -131,8 +131,8 @@ def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
             seconds = _seconds(told["reached"], told["seconds"])
             rows.append((f"{gait}, {learner}", f"{seconds}, {steps} ({seeds})"))
         if entry["ratio"] is not None:
-            bound = "> " if entry["ratio_is_lower_bound"] else ""
-            rows.append((f"{gait}, ratio", f"{bound}{entry['ratio']:.1f}"))
+            times = ratio_text(entry["ratio"], is_lower_bound=entry["ratio_is_lower_bound"])
+            rows.append((f"{gait}, ratio", times))
     return rows
 
 

@@ -4,14 +4,13 @@
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Sequence
-from math import floor
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import NullLocator
 
-from gaitshift.benchmark.outcome import Outcome, middle, ratio
+from gaitshift.benchmark.outcome import Outcome, middle, ratio, ratio_text
 from gaitshift.errors import GaitshiftError
 from gaitshift.plots.palette import INK, PALE, PAPER, QUIET, gait_colours
 from gaitshift.plots.style import check_target, house_style, save
@@ -64,8 +63,8 @@ def _draw_scale(axes: Axes, seconds: list[float], lanes: int) -> None:
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     axes.set_ylim(lanes - 0.5, -0.5)
-    axes.xaxis.set_major_locator(FixedLocator([t for t in _TICKS if low < t < high]))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    ticks = [tick for tick in _TICKS if low < tick < high]
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlabel("training time until the gait passes its check [s]")
     axes.grid(visible=True, axis="x")
@@ -118,9 +117,8 @@ def _name_lane(axes: Axes, gait: str, lane: int, medians: list[Outcome]) -> None
     times = ratio(*medians) if len(medians) == 2 else None
     if times is None:
         return
-    bound = "" if medians[1].reached else "> "
     axes.annotate(
-        f"{bound}{_rounded_down(times)} ×\nsooner",
+        f"{ratio_text(times, is_lower_bound=not medians[1].reached)} ×\nsooner",
         (1.0, lane),
         (12, 0),
         color=INK,
@@ -128,8 +126,3 @@ def _name_lane(axes: Axes, gait: str, lane: int, medians: list[Outcome]) -> None
         xycoords=("axes fraction", "data"),
         textcoords="offset points",
     )
-
-
-def _rounded_down(x: float) -> str:
-    """Two figures, or all before the point: a lower bound stays one."""
-    return f"{floor(x)}" if x >= 10 else f"{floor(10 * x) / 10:.1f}"
