@@ -34,7 +34,7 @@ HEAVY = (
     "imageio_ffmpeg",
     "PIL",
 )
-TORCH = ("torch", "tensordict", "rsl_rl", "onnx", "tensorboard")
+TORCH = ("torch", "tensordict", "rsl_rl", "onnx", "tensorboard", "stable_baselines3")
 
 
 def run_without(blocked: tuple[str, ...], program: str) -> subprocess.CompletedProcess[str]:
@@ -55,7 +55,7 @@ def test_module_runs_without_mujoco_torch_and_gymnasium(module):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("module", ["world", "env", "evaluation", "cli"])
+@pytest.mark.parametrize("module", ["world", "env", "evaluation", "benchmark.time_to_gait", "cli"])
 def test_module_runs_without_torch(module):
     done = run_without(TORCH, f"import gaitshift.{module}")
     assert done.returncode == 0, done.stderr

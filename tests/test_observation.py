@@ -1,6 +1,5 @@
 """The observation against numbers written by hand, and its mirror against a mirrored simulation."""
 
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import pairwise
 
@@ -22,6 +21,7 @@ from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
 from gaitshift.terrain import flat
 from gaitshift.world import World
+from symmetric import symmetric_robot
 
 TROT = gaits.load("trot")
 QUICK_TROT = RewardMachine.from_dict(
@@ -237,28 +237,6 @@ def test_two_mirrors_show_the_observation_itself(gait, names):
     once = signs * seen[:, order]
     np.testing.assert_array_equal(signs * once[:, order], seen)
     assert once.dtype == np.float32
-
-
-def symmetric_robot(folder):
-    """ANYmal B without what sets its left apart from its right.
-
-    The published inertial figures are not quite symmetric: the centre of mass of the base lies
-    1.4 mm to the right, its inertia has products with y, and the inertial sensor sits on the left.
-    """
-    tree = ET.parse(ANYMAL_B.model_file)
-    bodies = {body.get("name"): body for body in tree.iter("body")}
-    for name, body in bodies.items():
-        if name == "base" or name.endswith("_adapter"):
-            inertial = body.find("inertial")
-            x, _, z = inertial.get("pos").split()
-            xx, yy, zz, _, xz, _ = inertial.get("fullinertia").split()
-            inertial.set("pos", f"{x} 0 {z}")
-            inertial.set("fullinertia", f"{xx} {yy} {zz} 0 {xz} 0")
-    x, _, z = bodies["imu_link"].get("pos").split()
-    bodies["imu_link"].set("pos", f"{x} 0 {z}")
-    file = folder / "symmetric.xml"
-    tree.write(file)
-    return replace(ANYMAL_B, model_file=file)
 
 
 def both_sides_of_the_mirror(robot, *, steps, robots=4):

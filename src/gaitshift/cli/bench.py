@@ -1,48 +1,78 @@
-"""`gaitshift bench`: how fast the environment is against bare physics, and training on top."""
+"""`gaitshift bench`: how fast the environment is, and how soon a training has its gait."""
 
-import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from statistics import median
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
-from mujoco.batch import Batch
+import tyro
 
-from gaitshift import gaits
-from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
-from gaitshift.command import CONTROL_PERIOD
-from gaitshift.env import GaitEnv
-from gaitshift.errors import GaitshiftError
-from gaitshift.terrain import from_spec
+from gaitshift.benchmark.outcome import Outcome, ratio_text, summary, write_csv
+from gaitshift.benchmark.speed import SpeedConfig, environment_speed, training_speed
+from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
 
-ROUNDS = 7
-"""Rounds in which both are measured in turn; medians over them are quoted."""
+if TYPE_CHECKING:
+    from gaitshift.benchmark.time_to_gait import TimeToGait
+
+TABLE, PICTURE = "time_to_gait.csv", "time_to_gait.png"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeToGaitOptions:
+    """For `bench time-to-gait`."""
+
+    seeds: int | None = None
+    """Seeds that each gait is trained from; 3, with --quick 1."""
+    baseline_budget: float | None = None
+    """Training time after which a baseline is given up [s]; 600, with --quick 1; 0: no baseline."""
+    quick: bool = False
+    """Seconds of trot on few robots: shows that all of it works, not how fast it is."""
+    out: Path | None = None
+    """Folder for time_to_gait.csv and time_to_gait.png."""
+    overwrite: bool = False
+    """Replace these files in a folder that is not empty."""
+
+    def config(self) -> "TimeToGait":
+        """The measurement asked for."""
+        from gaitshift.benchmark.time_to_gait import TimeToGait
+
+        given = {"seeds": self.seeds, "baseline_budget": self.baseline_budget}
+        whole = TimeToGait.quick() if self.quick else TimeToGait()
+        return replace(whole, **{name: x for name, x in given.items() if x is not None})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure the environment against bare physics in the same run, and one training iteration.
+    """Measure how fast it is.
 
-    Both do the same motion: the robots step through the same small random actions.
+    `speed`: steps a second of the environment, beside bare physics in the same run, and of
+    training. `time-to-gait`: training until trot, pace and bound first pass a check on flat ground
+    (survival ≥ 0.99, speed within 0.1 m/s, pattern fraction ≥ 0.6), beside stable-baselines3's PPO
+    at its defaults with 30 robots; hours, most of them the baseline's.
     """
 
-    robots: int = 128
-    """Robots in parallel."""
-    steps: int = 100
-    """Control steps a round."""
-    terrain: str = "flat"
-    """Ground, as in `evaluate`."""
-    seed: int = 0
-    """Seed of the actions."""
+    what: Annotated[Literal["speed", "time-to-gait"], tyro.conf.Positional] = "speed"
+    """What to measure."""
+    speed: SpeedConfig = field(default_factory=SpeedConfig)
+    """For `bench speed`."""
+    time_to_gait: TimeToGaitOptions = field(default_factory=TimeToGaitOptions)
+    """For `bench time-to-gait`."""
     json: bool = False
     """One JSON object on stdout."""
 
     def run(self) -> None:
         """Measures and prints."""
-        if not (1 <= self.robots <= 65536 and 1 <= self.steps <= 100_000):
-            raise GaitshiftError("bench: robots from 1 to 65536 and steps from 1 to 100000, please")
+        if self.what == "speed":
+            self._measure_speed()
+        else:
+            self._measure_time_to_gait()
+
+    def _measure_speed(self) -> None:
         with progress("measuring") as report:
-            figures = self._measure(report)
+            figures = environment_speed(self.speed, report)
+            try:
+                figures |= training_speed(self.speed.seed)
+            except ImportError as error:
+                say(f"training is not measured: the package '{error.name}' is missing")
         if self.json:
             emit_json(figures)
             return
@@ -50,74 +80,61 @@ class Bench:
             (name, f"{value:,.2f}" if value < 10 else f"{value:,.0f}")
             for name, value in figures.items()
         ]
-        emit_table(f"bench: {self.robots} robots on {self.terrain}", rows)
+        emit_table(f"bench: {self.speed.robots} robots on {self.speed.terrain}", rows)
 
-    def _measure(self, report: Report) -> dict[str, float]:
-        ground = from_spec(self.terrain, seed=self.seed, length=20.0, width=20.0)
-        env = GaitEnv(gaits.load("trot"), ground, self.robots)
-        env.reset(seed=self.seed)
-        rng = np.random.default_rng(self.seed)
-        actions = rng.normal(scale=0.5, size=(self.steps, self.robots, 12))
-        bare = _Bare(env, actions)
-        seconds: dict[str, list[float]] = {"env": [], "bare": []}
-        for index in range(ROUNDS):
-            seconds["env"].append(_time(lambda: [env.step(action) for action in actions]))
-            seconds["bare"].append(_time(bare.run))
-            report(index + 1, ROUNDS + 1)
-        total = self.robots * self.steps
-        env_rate, bare_rate = (total / median(seconds[name]) for name in ("env", "bare"))
-        ratios = [b / e for e, b in zip(seconds["env"], seconds["bare"], strict=True)]
-        return {
-            "bare_steps_per_s": bare_rate,
-            "env_steps_per_s": env_rate,
-            "env_over_bare": median(ratios),
-            **self._training(),
-        }
+    def _measure_time_to_gait(self) -> None:
+        from gaitshift.benchmark.time_to_gait import time_to_gait
 
-    def _training(self) -> dict[str, float]:
-        """Steps a second of training, and what the flat stage then takes; nothing without torch."""
-        try:
-            from gaitshift.training.learner import Learner
-            from gaitshift.training.recipe import Recipe
-        except ImportError as error:
-            say(f"training is not measured: the package '{error.name}' is missing")
-            return {}
-        import torch
-
-        recipe = Recipe()
-        torch.set_num_threads(recipe.threads)
-        ground = from_spec("flat", seed=0, length=20.0, width=20.0)
-        env = GaitEnv(gaits.load("trot"), ground, recipe.robots, config=recipe.env)
-        learner = Learner(env, recipe)
-        learner.start_episodes(self.seed)
-        learner.iterate()
-        per_iteration = median([_time(learner.iterate) for _ in range(ROUNDS)])
-        flat = recipe.stages[0].iterations
-        return {
-            "training_steps_per_s": recipe.robots * recipe.steps / per_iteration,
-            "flat_stage_iterations": float(flat),
-            "flat_stage_minutes": flat * per_iteration / 60,
-        }
+        options = self.time_to_gait
+        config, out = options.config(), options.out
+        if out is not None:
+            check_folder(out, overwrite=options.overwrite, ours=(TABLE, PICTURE))
+        outcomes: list[Outcome] = []
+        with progress("training") as report:
+            for outcome in time_to_gait(config):
+                outcomes.append(outcome)
+                report(len(outcomes), config.trainings)
+                say(f"{outcome.gait}, seed {outcome.seed}, {outcome.learner}: {_text(outcome)}")
+                if out is not None:
+                    _write(outcomes, out)
+        found = summary(outcomes)
+        if self.json:
+            emit_json({"check": asdict(config.check), "gaits": found})
+            return
+        emit_table("time to gait, median over seeds (all seeds)", _rows(found))
 
 
-class _Bare:
-    """MuJoCo's own batch on the same model, driven to the same targets, and nothing else."""
+def _write(outcomes: list[Outcome], out: Path) -> None:
+    from gaitshift.plots import time_to_gait_figure  # matplotlib is slow to import
 
-    def __init__(self, env: GaitEnv, actions: np.ndarray) -> None:
-        world = env.world
-        self._batch = Batch(world.model, env.num_envs)
-        self._batch.bind("qpos")[:], self._batch.bind("qvel")[:] = world.state()
-        self._ctrl = self._batch.bind("ctrl")
-        self._targets = env.robot.stance_angles + env.robot.action_scale * actions
-        self._substeps = round(CONTROL_PERIOD / world.model.opt.timestep)
-
-    def run(self) -> None:
-        for target in self._targets:
-            self._ctrl[:] = target
-            self._batch.step(nstep=self._substeps)
+    out.mkdir(parents=True, exist_ok=True)
+    write_csv(outcomes, out / TABLE)
+    time_to_gait_figure(outcomes, out / PICTURE)
 
 
-def _time(work: Callable[[], object]) -> float:
-    start = time.perf_counter()
-    work()
-    return time.perf_counter() - start
+def _text(outcome: Outcome) -> str:
+    bound = "" if outcome.reached else "> "
+    return (
+        f"{bound}{outcome.seconds:.0f} s, {bound}{outcome.steps / 1e6:.2f} M steps "
+        f"(survival {outcome.survival:.2f}, {outcome.speed:.2f} m/s, "
+        f"pattern {outcome.pattern_fraction:.2f})"
+    )
+
+
+def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
+    rows: list[tuple[str, str]] = []
+    for gait, entry in found.items():
+        for learner, told in entry["learners"].items():
+            bound = "" if told["reached"] else "> "
+            seeds = ", ".join(_seconds(seed["reached"], seed["seconds"]) for seed in told["seeds"])
+            steps = f"{bound}{told['steps'] / 1e6:.2f} M steps"
+            seconds = _seconds(told["reached"], told["seconds"])
+            rows.append((f"{gait}, {learner}", f"{seconds}, {steps} ({seeds})"))
+        if entry["ratio"] is not None:
+            times = ratio_text(entry["ratio"], is_lower_bound=entry["ratio_is_lower_bound"])
+            rows.append((f"{gait}, ratio", times))
+    return rows
+
+
+def _seconds(reached: bool, seconds: float) -> str:
+    return f"{seconds:.0f} s" if reached else f"> {seconds:.0f} s"

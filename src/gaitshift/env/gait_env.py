@@ -241,7 +241,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         speed = rng.uniform(*machine.speed_range, len(ids))
         low, high = machine.dwell_range
         dwell = machine.dwell + scale * (rng.uniform(low, high, len(ids)) - machine.dwell)
-        strides = np.array([machine.stride(d) for d in np.rint(dwell).astype(int)])
+        strides = np.array([machine.stride(d) for d in np.rint(dwell).astype(int).tolist()])
         speeds, frequencies = (
             getattr(self._command, name).copy() for name in ("forward_speed", "stride_frequency")
         )

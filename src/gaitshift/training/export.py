@@ -1,5 +1,6 @@
 """A trained actor as a policy file."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -36,10 +37,21 @@ def describe(env: GaitEnv, training: dict[str, Any]) -> PolicyInfo:
 
 
 def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
-    """Writes the actor's deterministic part and `info` as one ONNX file, whole or not at all.
+    """Writes the actor's deterministic part and `info` as one ONNX file, whole or not at all."""
+    normalizer = cast(EmpiricalNormalization, actor.obs_normalizer)
+    write(list(actor.mlp), info, path, normalizer if actor.obs_normalization else None)
 
-    The graph is written out layer by layer (normalisation, then linear and leaky ReLU in turn): the
-    network is no more than that, and the file then depends on no tracer's version.
+
+def write(
+    layers: Sequence[torch.nn.Module],
+    info: PolicyInfo,
+    path: Path,
+    normalizer: EmpiricalNormalization | None = None,
+) -> None:
+    """Writes a network of these layers, behind `normalizer`, and `info` as one ONNX file.
+
+    The graph is written out layer by layer (linear, leaky ReLU, tanh): a policy is no more than
+    that, and the file then depends on no tracer's version.
     """
     nodes: list[NodeProto] = []
     constants: list[TensorProto] = []
@@ -54,24 +66,24 @@ def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
         nodes.append(helper.make_node(kind, inputs, [output], **attributes))
         return output
 
-    if actor.obs_normalization:
-        normalizer = cast(EmpiricalNormalization, actor.obs_normalizer)
+    if normalizer is not None:
         mean = constant("mean", normalizer.mean)
         std = constant("std", normalizer.std + normalizer.eps)
         flow = node("Div", [node("Sub", [flow, mean]), std])
-    for index, layer in enumerate(list(actor.mlp)):
+    for index, layer in enumerate(layers):
         if isinstance(layer, torch.nn.Linear):
             weight = constant(f"weight_{index}", layer.weight)
             bias = constant(f"bias_{index}", layer.bias)
             flow = node("Gemm", [flow, weight, bias], transB=1)
         elif isinstance(layer, torch.nn.LeakyReLU):
             flow = node("LeakyRelu", [flow], alpha=layer.negative_slope)
+        elif isinstance(layer, torch.nn.Tanh):
+            flow = node("Tanh", [flow])
         else:
             raise TypeError(f"cannot export a layer of type {type(layer).__name__}")
     nodes[-1].output[0] = "action"
-    observation = helper.make_tensor_value_info(
-        "observation", TensorProto.FLOAT, ["N", actor.obs_dim]
-    )
+    inputs = max(end for _, end in info.observation.values())
+    observation = helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["N", inputs])
     action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["N", 12])
     graph = helper.make_graph(nodes, "policy", [observation], [action], constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=9)

@@ -120,7 +120,7 @@ class Run:
         self._trim_progress()
         try:
             while self.iteration < self.recipe.iterations:
-                row = self._iterate()
+                row = self.iterate()
                 self._log(row, writer)
                 report(row)
                 if self._is_checkpoint():
@@ -141,7 +141,8 @@ class Run:
         }
         export(self.learner.ppo.actor, describe(self.learner.env, training), self.folder / POLICY)
 
-    def _iterate(self) -> Row:
+    def iterate(self) -> Row:
+        """One iteration, on the ground of its stage; gives the line that `train` writes down."""
         start = time.perf_counter()
         stage, within = stage_at(self.recipe, self.iteration)
         env = self.learner.env
