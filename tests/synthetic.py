@@ -5,7 +5,7 @@ import numpy as np
 from gaitshift.log import Log
 
 TABLE = {
-    # gait: (touchdowns of each foot within one cycle [cycle], duty: share of the cycle each is down)
+    # gait: (touchdowns of each foot in one cycle [cycle], share of the cycle each is down)
     "trot": (((0.0,), (0.5,), (0.5,), (0.0,)), (0.50, 0.50, 0.50, 0.50)),
     "pace": (((0.0,), (0.5,), (0.0,), (0.5,)), (0.50, 0.50, 0.50, 0.50)),
     "bound": (((0.0,), (0.0,), (0.5,), (0.5,)), (0.50, 0.50, 0.50, 0.50)),

@@ -82,7 +82,7 @@ def yaw(log: Log) -> Float[np.ndarray, "T N"]:
 def _heading_drift(sample: Sample) -> Figure:
     """Root mean square over the robots of the rate at which they turn beyond their command [rad/s].
 
-    A robot that needs a steady command to go straight drifts by that much, though it keeps its line.
+    A robot that needs a steady command to go straight drifts by that, though it keeps its line.
     """
     last = sample.alive.sum(axis=0) - 1
     long_enough = np.flatnonzero(last * sample.period >= _SHORTEST_DRIFT)

@@ -35,7 +35,7 @@ FIRST = Limits(
     duty_asymmetry=0.05,
     clearance=0.05,
 )
-"""Of the gaits the package was begun with: the paper's."""
+"""Of `FIRST_GAITS`."""
 
 OTHERS = Limits(
     survival=0.99,
@@ -49,9 +49,10 @@ OTHERS = Limits(
 )
 """Of every other gait."""
 
-_LIMITS = {"trot": FIRST, "pace": FIRST, "bound": FIRST}
+FIRST_GAITS = ("trot", "pace", "bound")
+"""The paper's."""
 
 
 def limits_of(gait: str) -> Limits:
     """The limits of a gait, by its name."""
-    return _LIMITS.get(gait, OTHERS)
+    return FIRST if gait in FIRST_GAITS else OTHERS

@@ -21,8 +21,8 @@ def measure(
     Robots are pooled. A figure is None where there was nothing to measure it by.
 
     - `survival`: share of robots that never fell, warm-up included.
-    - `speed_mean` [m/s]: mean velocity along body x; `speed_error` [m/s]: its distance from the mean
-      command; `speed_rmse` [m/s]: root mean square of the difference at each step.
+    - `speed_mean` [m/s]: mean velocity along body x; `speed_error` [m/s]: its distance from the
+      mean command; `speed_rmse` [m/s]: root mean square of the difference at each step.
     - `heading_drift` [rad/s]: root mean square over robots of the net turn beyond the commanded, by
       the time it took; `heading_error_sd` [rad]: spread of the heading about the line x.
     - `cost_of_transport`: mean mechanical power Σ|τ q̇| over m·g·v.

@@ -14,8 +14,8 @@ NONE = "none"
 """The name of what is no known gait."""
 
 LEAST_SCORE = 0.2
-"""Below it no gait is named. Ours: noise, standing and flicker stay below 0.1; a gait that shows its
-stance sets half of the time, with feet that touch twice a cycle, comes to 0.25."""
+"""Below it no gait is named. Ours: noise, standing and flicker stay below 0.1; a gait that shows
+its stance sets half of the time, with feet that touch twice a cycle, comes to 0.25."""
 
 
 def gait_scores(sample: Sample, others: Iterable[RewardMachine] = ()) -> dict[str, float]:
@@ -60,7 +60,8 @@ def _firmness(sample: Sample) -> float:
 def _phase(phases: Phases, machine: RewardMachine) -> float:
     axial = axial_of(machine)
     ideal = np.exp(2j * np.pi * np.array(axial) * ideal_of(machine))
-    return max(0.0, float((phases.moments(axial) * ideal.conj()).real.min()))
+    kept = np.real(phases.moments(axial) * np.conj(ideal))
+    return max(0.0, float(kept.min()))
 
 
 def _rhythm(phases: Phases, machine: RewardMachine) -> float:

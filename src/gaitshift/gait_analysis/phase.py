@@ -47,7 +47,7 @@ class Phases:
         return cls(fractions=fractions, strides=int(counts.sum()))
 
     def moments(self, axial: tuple[int, ...]) -> Complex[np.ndarray, " 4"]:
-        """Mean of exp(2πi p · fraction) of each foot, p from `axial`; 0 where it never came down."""
+        """Mean of exp(2πi p · fraction) of each foot, p from `axial`; 0 where it never came."""
         return np.array(
             [
                 np.exp(2j * np.pi * p * fraction).mean() if fraction.size else 0.0
@@ -73,9 +73,7 @@ def ideal_of(machine: RewardMachine) -> Float[np.ndarray, " 4"]:
     return ideal - ideal[0]
 
 
-def phase_errors(
-    phase: Float[np.ndarray, " 4"], machine: RewardMachine
-) -> Float[np.ndarray, " 4"]:
+def phase_errors(phase: Float[np.ndarray, " 4"], machine: RewardMachine) -> Float[np.ndarray, " 4"]:
     """Distance of each foot's phase from the ideal, on its circle of 1/p strides [stride]."""
     axial = np.array(axial_of(machine))
     turns = (phase - ideal_of(machine)) * axial

@@ -25,7 +25,7 @@ class Sample:
 
     @classmethod
     def of(cls, log: Log, warm_up: float = WARM_UP) -> "Sample":
-        """The sample of a whole log; it is empty where the log is no longer than the warm-up [s]."""
+        """The sample of a whole log; empty where the log is no longer than the warm-up [s]."""
         begin = int(np.searchsorted(log.time, warm_up, side="right"))
         return cls(log=log.part(slice(begin, None)))
 

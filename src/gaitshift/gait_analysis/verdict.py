@@ -11,6 +11,8 @@ from gaitshift.gait_analysis.phase import phase_errors
 from gaitshift.legs import LEGS, MIRRORED_LEGS
 from gaitshift.reward_machine import RewardMachine
 
+_UNITS = {"speed_error": "m/s", "phase_error": "stride", "clearance": "m"}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
@@ -33,6 +35,11 @@ class Check:
         if self.value is None:
             return False
         return self.value >= self.limit if self.bound == "at_least" else self.value <= self.limit
+
+    @property
+    def unit(self) -> str:
+        """Of value and limit; empty where they are shares."""
+        return _UNITS.get(self.figure, "")
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
