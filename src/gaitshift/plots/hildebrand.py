@@ -10,6 +10,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from gaitshift.legs import LEGS
 from gaitshift.log import Log
 from gaitshift.plots.palette import INK, PAPER, QUIET, gait_colours
 from gaitshift.plots.phase_circle import draw_phase_circle
@@ -56,13 +57,13 @@ def hildebrand_diagram(
         axes = figure.add_axes((0.045, 0.145, 0.575, 0.60))
         _draw_feet(axes, part, robot, figures)
         _draw_states(axes, part, robot, machine, colour)
-        circle = figure.add_axes((0.715, 0.11, 0.27, 0.68), projection="polar")
+        circle = figure.add_axes((0.709, 0.10, 0.24, 0.65), projection="polar")
         draw_phase_circle(circle, figures, machine)
         figure.text(0.015, 0.95, machine.title, size=19, weight="bold", color=colour, va="top")
         figure.text(0.015, 0.855, _headline(figures), size=13, color=INK, va="top")
-        figure.text(0.85, 0.95, "touchdown within the stride of FL", ha="center", va="top")
+        figure.text(0.829, 0.95, "touchdown within the stride of FL", ha="center", va="top")
         figure.text(
-            0.85,
+            0.829,
             0.885,
             "filled: mean, arc: ± 1 sd of all robots; open: ideal",
             ha="center",
@@ -121,7 +122,8 @@ def _draw_states(axes: Axes, log: Log, robot: int, machine: RewardMachine, colou
             alpha=0.45 if state % 2 else 0.18,
             linewidth=0,
         )
-        name = feet_text(machine.states[state].stance)
+        stance = machine.states[state].stance
+        name = "all feet" if len(stance) == len(LEGS) else feet_text(stance)
         if (span.end - span.begin) / SHOWN > _LETTER * len(name):
             axes.text(span.middle, _STRIP, name, ha="center", va="center", size=8.5, color=INK)
         axes.plot([span.begin] * 2, [low, high], color=PAPER, linewidth=1.0)

@@ -60,8 +60,9 @@ def draw_phase_circle(axes: Axes, figures: Mapping[str, Any], machine: RewardMac
 def _draw_mean(
     polar: PolarAxes, figures: Mapping[str, Any], leg: int, ring: float, p: int, turn: float
 ) -> None:
-    phase, consistency = figures["phase"][leg], figures["phase_consistency"][leg]
-    if phase is None:
+    phase: float | None = figures["phase"][leg]
+    consistency: float | None = figures["phase_consistency"][leg]
+    if phase is None or consistency is None:
         return
     angle = 2 * np.pi * (phase + turn)
     spread = min(sqrt(-2 * log(min(max(consistency, 1e-9), 1.0))), pi) / p
