@@ -74,7 +74,7 @@ def test_figures_of_a_perfect_trot_are_those_it_was_made_of():
     figures = measure(log, {"trot": TROT}, mass=20.0)
     assert figures["survival"] == 0.5
     assert figures["speed_mean"] == pytest.approx(0.9)
-    assert figures["speed_error"] == figures["speed_rmse"] == pytest.approx(0.3)
+    assert [figures["speed_error"], figures["speed_rmse"]] == pytest.approx([0.3, 0.3])
     assert figures["pattern_fraction"] == 1.0
     assert figures["cycles_per_s"] == pytest.approx(2.5, abs=0.01)
     assert figures["touchdowns_per_cycle"] == pytest.approx([1.0] * 4, abs=0.05)
@@ -275,11 +275,12 @@ def test_a_robot_whose_feet_flicker_shows_no_gait():
     assert name(contact & flicker) == NONE
 
 
-def test_a_half_bound_that_always_lands_on_the_same_foot_is_out_of_order():
+def test_a_half_bound_that_always_lands_on_the_same_foot_is_half_in_order_and_no_gait():
     machine = gaits.load("half_bound")
     contact = _one_hind_foot()
     alive = np.ones(contact.shape[:2], dtype=bool)
-    assert share_in_order(contact, alive, machine) == 0.0
+    assert share_in_order(contact, alive, machine) < 0.5
+    assert name(contact) == NONE
     right = contacts(*TABLE["half_bound"], frequency=1.4, robots=1)
     assert share_in_order(right, np.ones(right.shape[:2], dtype=bool), machine) > 0.9
 

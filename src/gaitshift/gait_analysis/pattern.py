@@ -15,7 +15,7 @@ def share_in_order(
 
     Other patterns between two stance sets are passed over, as landings take a few steps. A stance
     set is in order where it and the two shown before it follow each other in the machine's cycle:
-    two would not tell a half-bound, left and right hind foot in turn, from one that always lands
+    two would not tell a half-bound, left and right hind foot in turn, from one that often lands
     on the same. A robot that stays in one stance set shows no order.
     """
     cycle = _cycle(machine)

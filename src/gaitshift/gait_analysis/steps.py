@@ -27,7 +27,7 @@ def steady(contact: Bool[np.ndarray, "T N 4"], period: float) -> Bool[np.ndarray
     `period` is the time of a step [s].
     """
     steps = contact.shape[0]
-    rows = np.moveaxis(contact, 0, -1).reshape(-1, steps)
+    rows = np.moveaxis(contact, 0, -1).reshape(contact.shape[1] * 4, steps)
     rows = _without_short(rows, value=False, least=AIR / period)
     rows = _without_short(rows, value=True, least=GROUND / period)
     return np.moveaxis(rows.reshape(*contact.shape[1:], steps), -1, 0)
