@@ -10,28 +10,32 @@ import sys
 from pathlib import Path
 
 from gaitshift import policy
-from gaitshift.evaluation import EvaluationConfig, evaluate
-from gaitshift.plots import training_curves
+from gaitshift.evaluation import SIZES, run_trials
+from gaitshift.plots import hildebrand_diagram, training_curves
 
 POLICIES = Path(policy.__file__).parent / "policies"
 CURVES = Path(__file__).parent.parent / "docs" / "results" / "training"
-GROUNDS = ("flat", "perlin:0.10", "perlin:0.15", "slope:10")
+DIAGRAMS = Path(__file__).parent.parent / "docs" / "results" / "gaits"
 COLUMNS = ("iteration", "stage", "steps", "wall_s", "reward", "speed", "survival", "changes_per_s")
 EVERY = 10
 
 
 def ship(run: Path) -> None:
-    """Copies the policy of `run`, thins its curve, and evaluates it on every ground."""
+    """Copies the policy of `run`, thins its curve, and puts it through the standard trials."""
     loaded = policy.load(run / "policy.onnx")
     name = loaded.gait
-    figures = {}
-    for ground in GROUNDS:
-        figures[ground], _ = evaluate(loaded, EvaluationConfig(terrain=ground))
-        print(name, ground, json.dumps(figures[ground]))
+    rows, figures, log = run_trials(loaded, SIZES["all"])
+    print(name, json.dumps([row.to_dict() for row in rows]))
+    DIAGRAMS.mkdir(parents=True, exist_ok=True)
+    hildebrand_diagram(log, figures, loaded.machine, DIAGRAMS / f"{name}.png")
     shutil.copyfile(run / "policy.onnx", POLICIES / f"{name}.onnx")
     record = {
         **loaded.info.training,
-        "evaluation": {"command": f"gaitshift evaluate {name} --terrain GROUND", **figures},
+        "evaluation": {
+            "command": f"gaitshift evaluate {name} --trials all",
+            "trials": [row.to_dict() for row in rows],
+            "flat": figures,
+        },
     }
     (POLICIES / f"{name}.json").write_text(json.dumps(_rounded(record), indent=1) + "\n")
     with (run / "progress.csv").open(newline="") as file:

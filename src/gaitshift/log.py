@@ -1,7 +1,7 @@
 """What a run of N robots left behind, step by step: the one format of `--log FILE.npz`."""
 
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,16 @@ from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
 
+_TIMELESS = ("gaits", "robot", "terrain")
+"""What the names of fields begin with whose first axis is not time."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Log:
     """T control steps of N robots. Time comes first, then the robot, then the leg or joint.
 
     Entry t is the motion after control step t: what the controllers saw before their next action.
+    Positions, velocities, torques and heights may be kept in single precision: 4 µm at 50 m.
     """
 
     time: Float[np.ndarray, " T"]
@@ -61,6 +65,11 @@ class Log:
     """Length along x and width along y of the ground [m]."""
     terrain_origin: Float[np.ndarray, " 2"]
     """World x, y of its first sample [m]."""
+
+    def part(self, entries: slice) -> "Log":
+        """The same robots in some of the entries; arrays are shared."""
+        courses = (f.name for f in fields(self) if not f.name.startswith(_TIMELESS))
+        return replace(self, **{name: getattr(self, name)[entries] for name in courses})
 
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""

@@ -1,22 +1,29 @@
 """`gaitshift evaluate`: judges a policy on many robots at once."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from gaitshift import policy as policies
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import EvaluationConfig, evaluate
+from gaitshift.evaluation import SIZES, EvaluationConfig, evaluate, run_trials
+from gaitshift.evaluation.trials import Row
+from gaitshift.log import Log
 
 UNITS = {
     "speed_mean": "m/s",
+    "speed_error": "m/s",
     "speed_rmse": "m/s",
+    "heading_drift": "rad/s",
+    "heading_error_sd": "rad",
+    "roll_rate_sd": "rad/s",
+    "pitch_rate_sd": "rad/s",
     "cycles_per_s": "Hz",
     "slip": "m/s",
-    "heading_error_sd": "rad",
+    "clearance": "m",
     "lateral_error_p95": "m",
 }
 """Units of the figures that have one."""
@@ -31,38 +38,118 @@ class Evaluate(EvaluationConfig):
 
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
+    trials: Literal["all", "quick"] | None = None
+    """Run the standard trials instead, each figure against its limit: all (1000 pushed episodes,
+    then 256 of 20 s on each ground), or quick ones for a first look."""
     json: bool = False
     """One JSON object on stdout."""
     log: Path | None = None
-    """Write the whole run as an npz log to this file."""
+    """Write the whole run as an npz log to this file; of trials, the one on flat ground."""
+    plot: Path | None = None
+    """Draw the gait diagram and the phase circle into this file, ending in .png, .svg or .pdf."""
     overwrite: bool = False
-    """Replace the log file if it exists."""
+    """Replace files that exist."""
 
     def run(self) -> None:
-        """Evaluates and prints."""
-        if self.log is not None and self.log.exists() and not self.overwrite:
-            raise GaitshiftError(f"{self.log} exists; give another --log, or --overwrite")
+        """Evaluates, prints and draws."""
+        self._check_files()
         loaded = policies.load(self.policy)
-        config = EvaluationConfig(
-            **{name: getattr(self, name) for name in EvaluationConfig.__dataclass_fields__}
-        )
-        with progress(f"{loaded.gait} on {self.terrain}") as report:
-            figures, log = evaluate(loaded, config, report)
+        if self.trials is None:
+            figures, log = self._evaluate(loaded)
+        else:
+            figures, log = self._try(loaded, self.trials)
         if self.log is not None:
             self.log.parent.mkdir(parents=True, exist_ok=True)
             log.save(self.log)
             say(f"log written to {self.log}")
+        if self.plot is not None:
+            from gaitshift.plots import hildebrand_diagram  # matplotlib is slow to import
+
+            hildebrand_diagram(log, figures, loaded.machine, self.plot)
+            say(f"diagram written to {self.plot}")
+
+    def _evaluate(self, loaded: policies.Policy) -> tuple[dict[str, Any], Log]:
+        config = self._config()
+        with progress(f"{loaded.gait} on {self.terrain}") as report:
+            figures, log = evaluate(loaded, config, report)
         if self.json:
             emit_json(
                 {"policy": str(loaded.path), "gait": loaded.gait, **asdict(config), **figures}
             )
+        else:
+            title = f"{loaded.gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"
+            emit_table(title, _figure_rows(figures))
+        return figures, log
+
+    def _try(
+        self, loaded: policies.Policy, size: Literal["all", "quick"]
+    ) -> tuple[dict[str, Any], Log]:
+        with progress(f"trials of {loaded.gait}") as report:
+            rows, figures, log = run_trials(loaded, SIZES[size], self.seed, report)
+        if self.json:
+            emit_json(
+                {
+                    "policy": str(loaded.path),
+                    "gait": loaded.gait,
+                    "size": {"name": size, **asdict(SIZES[size])},
+                    "seed": self.seed,
+                    "trials": [row.to_dict() for row in rows],
+                    "figures": figures,
+                }
+            )
+        else:
+            failed = sum(row.passed is False for row in rows)
+            limited = sum(row.passed is not None for row in rows)
+            title = f"{loaded.gait}, {size} trials: {limited - failed} of {limited} limits kept"
+            emit_table(title, [_trial_row(row) for row in rows])
+        return figures, log
+
+    def _config(self) -> EvaluationConfig:
+        names = EvaluationConfig.__dataclass_fields__
+        return EvaluationConfig(**{name: getattr(self, name) for name in names})
+
+    def _check_files(self) -> None:
+        """Refuses what cannot be done before any work."""
+        for option, path in (("--log", self.log), ("--plot", self.plot)):
+            if path is not None and path.exists() and not self.overwrite:
+                raise GaitshiftError(f"{path} exists; give another {option}, or --overwrite")
+        if self.plot is not None:
+            from gaitshift.plots.style import check_target
+
+            check_target(self.plot)
+        if self.trials is None:
             return
-        rows = [(name, _text(value, UNITS.get(name, ""))) for name, value in figures.items()]
-        title = f"{loaded.gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"
-        emit_table(title, rows)
+        for field in fields(EvaluationConfig):
+            if field.name != "seed" and getattr(self, field.name) != field.default:
+                option = field.name.replace("_", "-")
+                raise GaitshiftError(f"--trials has grounds and lengths of its own: no --{option}")
 
 
-def _text(value: float | list[float], unit: str) -> str:
+def _figure_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
+    plain = {name: value for name, value in figures.items() if name != "verdict"}
+    rows = [(name, _text(value, UNITS.get(name, ""))) for name, value in plain.items()]
+    verdict = figures["verdict"]
+    score = max(verdict["scores"].values())
+    rows.append(("verdict", f"{verdict['gait']}, score {score:.2f}"))
+    rows.append(("clean", "yes" if verdict["clean"] else "no"))
+    for miss in verdict["misses"]:
+        side = "at_least" if "at_least" in miss else "at_most"
+        foot = f", {miss['foot']}" if "foot" in miss else ""
+        limit = f"{side.replace('_', ' ')} {miss[side]:g}"
+        rows.append((f"  misses {miss['figure']}{foot}", f"{_text(miss['value'], '')}, {limit}"))
+    return rows
+
+
+def _trial_row(row: Row) -> tuple[str, ...]:
+    value = _text(row.value, "")
+    if row.limit is None:
+        return row.trial, value, "", "reported"
+    limit = f"{row.bound.replace('_', ' ')} {row.limit:g}"
+    return row.trial, value, limit, "pass" if row.passed else "FAIL"
+
+
+def _text(value: float | list[float | None] | None, unit: str) -> str:
     if isinstance(value, list):
-        return " ".join(f"{x:.3f}" for x in value)
-    return f"{value:.4g} {unit}".strip()
+        numbers = " ".join("–" if x is None else f"{x:.3f}" for x in value)
+        return f"{numbers} {unit}".strip()
+    return "–" if value is None else f"{value:.4g} {unit}".strip()

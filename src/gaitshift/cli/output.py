@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ def emit_json(data: Any) -> None:
     print(json.dumps(data, allow_nan=False))
 
 
-def emit_table(title: str, rows: list[tuple[str, str]]) -> None:
+def emit_table(title: str, rows: Sequence[tuple[str, ...]]) -> None:
     """A short table on stdout."""
     table = Table(title=title, show_header=False, title_justify="left")
     for row in rows:

@@ -7,3 +7,5 @@ from gaitshift.evaluation.evaluate import EvaluationConfig as EvaluationConfig
 from gaitshift.evaluation.evaluate import evaluate as evaluate
 from gaitshift.evaluation.rollout import RolloutConfig as RolloutConfig
 from gaitshift.evaluation.rollout import rollout as rollout
+from gaitshift.evaluation.trials import SIZES as SIZES
+from gaitshift.evaluation.trials import run_trials as run_trials

@@ -1,6 +1,6 @@
 """What figures and videos derive from a log: spans of time, speeds, the ground, smooth courses."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -8,9 +8,6 @@ from jaxtyping import Float, Shaped
 from gaitshift.errors import GaitshiftError
 from gaitshift.log import Log
 from gaitshift.terrain import Terrain
-
-_TIMELESS = ("gaits", "robot", "terrain")
-"""What the names of a log's fields begin with where the first axis is not time."""
 
 _SAME_GROUND = 0.01
 """Grounds that differ by no more below all feet are the same [m]."""
@@ -44,14 +41,14 @@ def check_robot(log: Log, robot: int) -> None:
 
 def window(log: Log, t0: float, t1: float) -> Log:
     """The entries of a log from `t0` to `t1` [s]; `GaitshiftError` where they are less than two."""
-    inside = (log.time >= t0) & (log.time <= t1)
-    if np.count_nonzero(inside) < 2:
+    begin = int(np.searchsorted(log.time, t0, side="left"))
+    end = int(np.searchsorted(log.time, t1, side="right"))
+    if end - begin < 2:
         raise GaitshiftError(
             f"nothing to show from {t0:g} to {t1:g} s: the log goes from {log.time[0]:g} "
             f"to {log.time[-1]:g} s"
         )
-    courses = (f.name for f in fields(log) if not f.name.startswith(_TIMELESS))
-    return replace(log, **{name: getattr(log, name)[inside] for name in courses})
+    return log.part(slice(begin, end))
 
 
 def period(log: Log) -> float:

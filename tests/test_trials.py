@@ -1,0 +1,145 @@
+"""The standard trials and `evaluate`'s picture, on policies that are barely trained."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from gaitshift import gaits, policy
+from gaitshift.cli import main
+from gaitshift.env import GaitEnv
+from gaitshift.evaluation import SIZES, run_trials
+from gaitshift.evaluation import trials as trials_module
+from gaitshift.evaluation.trials import TRIALS, Row, Size, lateral_errors
+from gaitshift.terrain import flat, from_spec
+from gaitshift.training.export import describe, export
+from gaitshift.training.learner import Learner
+from gaitshift.training.recipe import PpoConfig, Recipe
+from synthetic import log_of
+
+TINY = Size(pushed=6, episodes=3, seconds=0.3, distance=0.2)
+
+
+@pytest.fixture(scope="module")
+def walk_file(tmp_path_factory):
+    """An untrained policy that holds the stance: its actions are all but zero."""
+    torch.manual_seed(0)
+    env = GaitEnv(gaits.load("walk"), flat(10.0, 10.0), 2, threads=1)
+    actor = Learner(
+        env, Recipe(env=env.config, ppo=PpoConfig(hidden=(8, 8)), robots=2, steps=2)
+    ).ppo.actor
+    with torch.no_grad():
+        for parameter in actor.mlp.parameters():
+            parameter.mul_(0.01)
+    path = tmp_path_factory.mktemp("policy") / "walk.onnx"
+    export(actor.eval(), describe(env, {}), path)
+    return path
+
+
+def test_trials_give_a_row_for_every_ground_and_every_limit(walk_file):
+    done = []
+    rows, figures, log = run_trials(
+        policy.load(walk_file), TINY, report=lambda now, total: done.append((now, total))
+    )
+    titles = [row.trial for row in rows]
+    assert len(set(titles)) == len(rows) == len(TRIALS) + 7
+    assert [title for title in titles if "perlin:0.20" in title]
+    survival = [row for row in rows if row.trial.startswith("survival")]
+    assert all(row.value == 1.0 for row in survival), "standing for 0.3 s is no feat"
+    lateral = [row for row in rows if row.trial.startswith("lateral")]
+    assert all(row.value is None and row.passed is False for row in lateral), "nobody walks"
+    assert log.contact.shape == (30, 3, 4)
+    assert figures["verdict"]["gait"] == "none"
+    assert done[-1][0] == done[-1][1]
+    assert [now for now, _ in done] == sorted(now for now, _ in done)
+
+
+def test_batches_have_all_robots_and_seeds_of_their_own(walk_file, monkeypatch):
+    monkeypatch.setattr(trials_module, "BATCH", 16 * 30)
+    size = replace(TINY, pushed=40)
+    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), size, 5))
+    assert [config.episodes for config in configs] == [16, 16, 8]
+    assert [config.seed for config in configs] == [5, 6, 7]
+
+
+@pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: trial.terrain)
+def test_grounds_of_trials_are_long_enough_and_level_where_robots_start(trial):
+    """Starts lie at 2 m; stairs and steps come again and again over the whole length."""
+    ground = from_spec(trial.spec(20.0), seed=0, length=20.0, width=2.0)
+    assert ground.size[0] >= 20.0
+    if trial.piece is None:
+        return
+    profile = ground.height_at(np.stack([np.linspace(0, 20, 400), np.zeros(400)], axis=1))
+    assert np.ptp(profile[:50]) == 0.0
+    rises = np.flatnonzero(np.diff(profile) > 1e-6)
+    assert len(rises) >= 3
+    assert rises.max() > 300
+
+
+def test_the_quick_trials_are_a_small_part_of_all():
+    assert SIZES["all"].pushed == 1000
+    assert SIZES["all"].episodes == 256
+    assert SIZES["quick"].episodes * SIZES["quick"].seconds < 0.05 * 256 * 20
+
+
+def test_the_lateral_error_is_taken_at_the_distance_and_who_never_arrives_is_beyond_all():
+    """Robots at 1 m/s: drifting by 0.1 m a metre from y = 2; too slow; fallen before."""
+    log = log_of(np.zeros((300, 3, 4), dtype=bool))
+    x = np.arange(300) / 100
+    log.qpos[:, 0, 0], log.qpos[:, 0, 1] = x, 2.0 - 0.1 * x
+    log.qpos[:, 1, 0] = 0.3 * x
+    log.qpos[:, 2, 0] = x
+    log.fallen[50:, 2] = True
+    assert lateral_errors(log, 2.0) == pytest.approx([0.2, np.inf, np.inf])
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "limit", "passed"),
+    [
+        (0.97, "at_least", 0.97, True),
+        (0.96, "at_least", 0.97, False),
+        (0.5, "at_most", 0.5, True),
+        (0.51, "at_most", 0.5, False),
+        (None, "at_most", 0.5, False),
+        (0.1, "at_least", None, None),
+    ],
+)
+def test_a_row_passes_on_the_right_side_of_its_limit(value, bound, limit, passed):
+    assert Row(trial="x", value=value, bound=bound, limit=limit).passed is passed
+
+
+def test_evaluate_prints_one_object_and_draws(walk_file, tmp_path, capsys):
+    picture = tmp_path / "walk.png"
+    options = ["--episodes", "2", "--seconds", "2.5", "--json", "--plot", str(picture)]
+    main(["evaluate", str(walk_file), *options])
+    said = json.loads(capsys.readouterr().out)
+    assert said["gait"] == "walk"
+    assert said["verdict"]["gait"] == "none"
+    assert set(said["verdict"]["scores"]) == set(gaits.names())
+    assert picture.stat().st_size > 10_000
+
+
+def test_trials_print_one_object(walk_file, capsys, monkeypatch):
+    monkeypatch.setitem(SIZES, "quick", TINY)
+    main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
+    said = json.loads(capsys.readouterr().out)
+    assert len(said["trials"]) == len(TRIALS) + 7
+    assert said["size"]["name"] == "quick"
+    main(["evaluate", str(walk_file), "--trials", "quick"])
+    assert "limits kept" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--trials", "quick", "--terrain", "slope:10"], "no --terrain"),
+        (["--plot", "walk.gif"], "walk.gif: the name of a figure ends in"),
+    ],
+)
+def test_what_cannot_be_done_is_said_before_the_work(walk_file, options, says, capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", str(walk_file), *options])
+    assert end.value.code == 2
+    assert says in capsys.readouterr().err
