@@ -17,7 +17,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.reward import RewardConfig
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
-from gaitshift.training.ground import draw_ground, stage_at
+from gaitshift.training.ground import draw_grounds, stage_at
 from gaitshift.training.learner import Learner
 from gaitshift.training.recipe import PRESETS, PpoConfig, Recipe, Stage
 from gaitshift.training.run import Run
@@ -25,7 +25,7 @@ from gaitshift.world import PushConfig
 
 TROT = gaits.load("trot")
 TINY = Recipe(
-    env=EnvConfig(episode_steps=30, heading_interval=11),
+    env=EnvConfig(episode_steps=30, command_interval=11),
     ppo=PpoConfig(hidden=(16, 8), epochs=2, mini_batches=2),
     stages=(
         Stage(name="flat", iterations=3, push=50.0),
@@ -33,8 +33,10 @@ TINY = Recipe(
     ),
     robots=4,
     steps=8,
-    swing_from=1,
-    swing_until=4,
+    strict_from=1,
+    strict_until=4,
+    command_from=0,
+    command_until=5,
     checkpoint_every=2,
     threads=1,
 )
@@ -120,7 +122,8 @@ def test_the_paper_preset_has_the_papers_figures():
     assert recipe.env.reward == RewardConfig.paper()
     assert recipe.env.forward_speed == 1.2
     assert recipe.env.gains == "paper"
-    assert recipe.swing_scale(0) == recipe.swing_scale(499) == 0.0
+    assert recipe.strictness(0) == recipe.strictness(499) == 0.0
+    assert recipe.env.command_share == recipe.env.heading_range == 0.0
 
 
 @pytest.mark.parametrize(
@@ -129,8 +132,10 @@ def test_the_paper_preset_has_the_papers_figures():
         {"robots": 0},
         {"robots": 65537},
         {"steps": 0},
-        {"swing_from": 4, "swing_until": 4},
-        {"swing_from": -1},
+        {"strict_from": 4, "strict_until": 4},
+        {"strict_from": -1},
+        {"command_from": 5, "command_until": 5},
+        {"command_from": -1},
         {"stages": ()},
         {"stages": (Stage(name="flat", iterations=0),)},
         {"stages": (Stage(name="flat", iterations=5), Stage(name="rough", iterations=-1))},
@@ -170,11 +175,17 @@ def test_no_iterations_are_too_few():
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])
-def test_the_swing_height_grows_in_a_straight_line_up_to_its_share(share):
-    recipe = replace(TINY, swing_from=10, swing_until=30, swing_share=share)
+def test_strictness_grows_in_a_straight_line_up_to_its_share(share):
+    recipe = replace(TINY, strict_from=10, strict_until=30, strict_share=share)
     table = {0: 0.0, 10: 0.0, 15: 0.25, 20: 0.5, 30: 1.0, 31: 1.0, 1000: 1.0}
     for iteration, grown in table.items():
-        assert recipe.swing_scale(iteration) == share * grown
+        assert recipe.strictness(iteration) == share * grown
+
+
+def test_commands_spread_in_a_straight_line_and_go_by_no_other_schedule():
+    recipe = replace(TINY, command_from=8, command_until=16, strict_from=100, strict_until=101)
+    table = {0: 0.0, 8: 0.0, 9: 0.125, 12: 0.5, 16: 1.0, 17: 1.0, 1000: 1.0}
+    assert {i: recipe.command_scale(i) for i in table} == table
 
 
 # Grounds ----------------------------------------------------------------------------------------
@@ -245,11 +256,11 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
 def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
     run, _ = whole
     world = run.learner.env.world
-    np.testing.assert_array_equal(
-        world.terrains[0].height, draw_ground(TINY.stages[1], 2, run.seed).height
-    )
+    drawn = draw_grounds(TINY.stages[1], 2, run.seed)[: TINY.robots]
+    for ground, expected in zip(world.terrains, drawn, strict=True):
+        np.testing.assert_array_equal(ground.height, expected.height)
     assert run.learner.env.config.push.force == 100.0
-    assert run.learner.env.swing_scale == 1.0
+    assert run.learner.env.strictness == run.learner.env.command_scale == 1.0
 
 
 def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(whole):
@@ -691,8 +702,10 @@ def test_thirty_iterations_are_enough_to_find_the_cycle_of_a_gait(tmp_path):
         stages=(Stage(name="flat", iterations=30),),
         robots=64,
         steps=24,
-        swing_from=1000,
-        swing_until=1001,
+        strict_from=1000,
+        strict_until=1001,
+        command_from=1000,
+        command_until=1001,
         threads=1,
     )
     reported = []
