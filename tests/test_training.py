@@ -29,7 +29,15 @@ TINY = Recipe(
     ppo=PpoConfig(hidden=(16, 8), epochs=2, mini_batches=2),
     stages=(
         Stage(name="flat", iterations=3, push=50.0),
-        Stage(name="rough", iterations=3, amplitude=0.1, redraw_every=2, push=100.0),
+        Stage(
+            name="rough",
+            iterations=3,
+            amplitude=0.1,
+            slope=8.0,
+            rise=0.04,
+            redraw_every=2,
+            push=100.0,
+        ),
     ),
     robots=4,
     steps=8,
@@ -199,30 +207,88 @@ def test_each_iteration_has_its_stage_and_its_number_within_it():
     assert (stage.name, within) == ("c", 8), "beyond the end the last stage goes on"
 
 
-def test_the_same_numbers_give_the_same_ground_and_others_another():
-    stage = Stage(name="rough", iterations=40, amplitude=0.1)
+ROUGH = Stage(name="rough", iterations=50, amplitude=0.15, slope=12.0, rise=0.06)
 
+
+def measures(ground):
+    """Largest |height|, steepest gradient [degrees] and highest edge [m] of a ground."""
+    along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
+    # On a plane the gradient is the same all over; on stairs it is an edge over a cell.
+    gradient = np.degrees(np.arctan(np.hypot(along_x, along_y).max()))
+    edge = np.abs(np.diff(ground.height, axis=1)).max()
+    return np.abs(ground.height).max(), gradient, edge
+
+
+def sorts(grounds):
+    """Names of the kinds, told by the ground itself: a plane, steps along x, or noise."""
+    told = []
+    for ground in grounds:
+        bent = np.abs(np.diff(ground.height, n=2, axis=1)).max() > 1e-9
+        same_across = np.ptp(ground.height, axis=0).max() == 0
+        told.append("noise" if bent and not same_across else "stairs" if bent else "plane")
+    return told
+
+
+def test_the_same_numbers_give_the_same_grounds_and_others_others():
     def drawn(within, seed):
-        return draw_ground(stage, within, seed).height
+        return [ground.height.tobytes() for ground in draw_grounds(ROUGH, within, seed)]
 
-    np.testing.assert_array_equal(drawn(5, 1), drawn(5, 1))
-    assert not np.array_equal(drawn(5, 1), drawn(10, 1))
-    assert not np.array_equal(drawn(5, 1), drawn(5, 2))
+    assert drawn(5, 1) == drawn(5, 1)
+    for other in (drawn(10, 1), drawn(5, 2)):
+        assert all(one != another for one, another in zip(drawn(5, 1), other, strict=True))
+    assert len(set(drawn(5, 1))) == 6, "and no two robots' fields are alike"
 
 
-@pytest.mark.parametrize("amplitude", [0.005, 0.15])
-def test_no_ground_is_higher_than_its_stage_says_and_late_ones_come_near_it(amplitude):
-    stage = Stage(name="rough", iterations=50, amplitude=amplitude)
-    highest = np.array(
-        [np.abs(draw_ground(stage, within, 0).height).max() for within in range(0, 50, 4)]
+def test_half_of_the_fields_are_noise_and_the_others_slopes_and_stairs():
+    for within in (0, 20, 45):
+        grounds = draw_grounds(ROUGH, within, 3)
+        assert sorts(grounds) == ["noise"] * 3 + ["plane"] * 2 + ["stairs"]
+        assert len({ground.extent for ground in grounds}) == 1, "robots share one rectangle"
+
+
+def test_slopes_rise_in_any_direction():
+    angles = []
+    for within in range(0, 50, 2):
+        for ground in draw_grounds(ROUGH, within, 0)[3:5]:
+            along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
+            angles.append(np.arctan2(along_y.mean(), along_x.mean()))
+    quarters = np.bincount(np.floor(np.array(angles) / (np.pi / 2)).astype(int) + 2, minlength=4)
+    assert quarters.min() >= 5, "of 50 slopes"
+
+
+def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
+    found = np.array(
+        [
+            [measures(ground) for ground in draw_grounds(ROUGH, within, 0)]
+            for within in range(0, 50, 2)
+        ]
     )
-    assert highest.max() <= amplitude * (1 + 1e-9)
-    assert highest[7:].max() > 0.8 * amplitude
-    assert highest[:2].max() < highest[7:].max()
+    limits = {"noise": (slice(0, 3), 0, 0.15), "plane": (slice(3, 5), 1, 12.0)}
+    limits["stairs"] = (slice(5, 6), 2, 0.06)
+    for name, (fields_, measure, limit) in limits.items():
+        most = found[:, fields_, measure].max(axis=1)
+        assert most.max() <= limit * (1 + 1e-9), name
+        assert most[13:].max() > 0.8 * limit, name
+        # The first fields reach 0.3 of it, and 0.3 + 0.7 · 4 / 25 after four iterations.
+        assert most[:3].max() <= 0.412 * limit * (1 + 1e-9), name
 
 
-def test_a_stage_without_amplitude_is_level():
-    assert draw_ground(Stage(name="flat", iterations=5), 3, 0).is_flat
+@pytest.mark.parametrize(
+    ("measure", "rough"),
+    [("amplitude", [0, 1, 2]), ("slope", [3, 4]), ("rise", [5])],
+)
+def test_a_stage_of_one_kind_leaves_the_fields_of_the_others_level(measure, rough):
+    stage = Stage(name="one", iterations=10, **{measure: 0.1})
+    assert stage.is_rough
+    grounds = draw_grounds(stage, 9, 0)
+    assert [i for i, ground in enumerate(grounds) if not ground.is_flat] == rough
+
+
+def test_a_stage_without_measures_is_level():
+    stage = Stage(name="flat", iterations=5)
+    assert not stage.is_rough
+    (ground,) = draw_grounds(stage, 3, 0)
+    assert ground.is_flat
 
 
 # A run and its folder ---------------------------------------------------------------------------
@@ -267,6 +333,12 @@ def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(wh
     run, _ = whole
     loaded = policy.load(run.folder / "policy.onnx")
     assert loaded.gait == "trot"
+    info, trot = loaded.info, gaits.load("trot")
+    assert (info.forward_speed, info.speed_range) == (trot.speed, list(trot.speed_range))
+    # Two states; control steps of 0.01 s.
+    assert info.stride_frequency == pytest.approx(50 / trot.dwell)
+    slow, fast = trot.dwell_range[::-1]
+    assert info.stride_frequency_range == pytest.approx([50 / slow, 50 / fast])
     training = loaded.info.training
     assert (training["seed"], training["iterations"], training["steps"]) == (7, 6, 192)
     assert training["command"] == "gaitshift train trot"
