@@ -88,7 +88,7 @@ def _synthetic_log(*, speed: float, period: int, steps: int, fallen_from: int | 
         machine_state=np.stack([np.where(left, 0, 1), np.zeros(steps, dtype=np.int64)], axis=1),
         stance_shown=np.stack([np.ones(steps, dtype=bool), np.zeros(steps, dtype=bool)], axis=1),
         fallen=fallen,
-        command=np.tile([1.2, 0.0], (steps, 2, 1)),
+        command=np.tile([1.2, 0.0, 2.5], (steps, 2, 1)),
         gaits=("trot",),
         robot="anymal_b",
         terrain="flat",
@@ -165,6 +165,10 @@ def test_a_schedule_is_kept_to_the_step() -> None:
         (lambda: EvaluationConfig(episodes=0), "0 episodes: 1 to 100000"),
         (lambda: EvaluationConfig(seconds=-1.0), "-1.0 seconds: more than 0"),
         (lambda: EvaluationConfig(seed=-1), "seed -1"),
+        (lambda: EvaluationConfig(speed=-0.1), "-0.1 m/s: 0 to 3 m/s"),
+        (lambda: EvaluationConfig(speed=float("nan")), "nan m/s: 0 to 3 m/s"),
+        (lambda: EvaluationConfig(stride_frequency=0.0), "0.0 Hz: more than 0, up to 100 Hz"),
+        (lambda: EvaluationConfig(stride_frequency=101.0), "101.0 Hz: more than 0, up to 100 Hz"),
         (lambda: DemoConfig(episodes=0), "0 episodes"),
         (lambda: DemoConfig(gaits=("trot",)), "one gait alone"),
         (lambda: DemoConfig(gaits=("trot", "pace"), at=(1.0, 2.0)), "2 times for 2 gaits"),
@@ -204,7 +208,7 @@ def test_a_damaged_or_foreign_log_is_named(tmp_path) -> None:
 def test_grounds_of_an_evaluation_reach_as_far_as_robots_can_walk() -> None:
     from gaitshift.evaluation.evaluate import RUN_UP, _grounds
 
-    grounds = _grounds(EvaluationConfig(terrain="perlin:0.1"), RolloutConfig(seconds=10.0))
+    grounds = _grounds(EvaluationConfig(terrain="perlin:0.1", seconds=10.0), 1.2)
     assert len(grounds) == 8
     assert all(g.extent[0] == -RUN_UP and g.extent[1] > 1.2 * 10.0 + 1.0 for g in grounds)
     assert len({g.height.tobytes() for g in grounds}) == 8

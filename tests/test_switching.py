@@ -26,10 +26,10 @@ FEET = ("FL", "FR", "BL", "BR")
 BASE_HEIGHT = 0.5
 
 
-def exported(folder, machine, *, seed=0, constant=None, gains="default"):
+def exported(folder, machine, *, seed=0, constant=None, gains="default", speed=None):
     """An untrained policy of a machine; with `constant` its twelve actions are always those."""
     torch.manual_seed(seed)
-    config = EnvConfig(gains=gains)
+    config = EnvConfig(gains=gains, forward_speed=speed)
     env = GaitEnv(machine, flat(10.0, 10.0), 1, config=config, threads=1)
     recipe = Recipe(env=config, ppo=PpoConfig(hidden=(16,)), robots=1, steps=1)
     actor = Learner(env, recipe).ppo.actor
@@ -253,6 +253,53 @@ def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_act
     )
     expected = bound.target(bound(bound.observation(shown)))
     np.testing.assert_allclose(driver.act(motion, command)[1:], expected, atol=1e-6)
+
+
+def with_dwell(machine, dwell, name):
+    """The same two-state machine at another dwell [control steps], by another name."""
+    tables = machine.to_dict() | {"name": name, "dwell": dwell, "dwell_range": [10, 40]}
+    for way in tables["transition"]:
+        way["dwell"] = dwell
+    return RewardMachine.from_dict(tables)
+
+
+@pytest.fixture(scope="module")
+def paced(tmp_path_factory):
+    """Policies at home at different commands: 1.1 m/s and 100 / (2 · 20) Hz, 0.6 and 2 · 25."""
+    folder = tmp_path_factory.mktemp("paced")
+    return {
+        "quick": exported(folder, with_dwell(gaits.load("trot"), 20, "quick"), speed=1.1),
+        "slow": exported(folder, with_dwell(gaits.load("bound"), 25, "slow"), speed=0.6),
+    }
+
+
+def test_after_a_shift_a_robots_own_command_is_that_of_its_new_gait(paced):
+    driver = Driver(paced, 3, start="quick")
+    driver.switch(np.array([1]), "slow", motion_of(["FL BR"] * 3))
+    own = driver.own_command()
+    np.testing.assert_allclose(own.forward_speed, [1.1, 0.6, 1.1])
+    np.testing.assert_allclose(own.stride_frequency, [2.5, 2.0, 2.5])
+    assert not own.yaw_rate.any()
+    driver.switch(np.array([0, 1]), "quick", motion_of(["FL BR"] * 3))
+    np.testing.assert_allclose(driver.own_command().forward_speed, 1.1)
+
+
+def test_a_commanded_stride_frequency_holds_each_robots_machine_back_for_its_dwell(paced):
+    # Strides of 50 and 33.3 steps: dwells of 25 and of 17 (34 steps) for all, whatever the gait;
+    # strides of 10 and 200 steps end at the ranges, 10 and 40.
+    driver = Driver(paced, 4, start="quick")
+    driver.switch(np.array([1, 3]), "slow", motion_of(["FL BR", "FL FR"] * 2))
+    command = Command(
+        forward_speed=np.full(4, 1.0),
+        yaw_rate=np.zeros(4),
+        stride_frequency=np.array([2.0, 3.0, 10.0, 0.5]),
+    )
+    changed_at = {}
+    for step in range(1, 60):
+        driver.see(motion_of(["FR BL", "BL BR"] * 2), command)
+        for robot in np.flatnonzero(driver.machine_state == 1):
+            changed_at.setdefault(int(robot), step)
+    assert changed_at == {0: 25, 1: 17, 2: 10, 3: 40}
 
 
 def test_machines_go_on_as_the_feet_do(policies):
