@@ -30,7 +30,8 @@ class EvaluationConfig:
     """What a policy is put through."""
 
     terrain: str = "flat"
-    """Spec of the ground: flat, perlin:A, slope:DEG, stairs:H, step:H, pebbles:H, or a track."""
+    """Spec of the ground: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a
+    track."""
     episodes: int = 256
     """Robots, each running one episode, all at once."""
     seconds: float = 10.0
