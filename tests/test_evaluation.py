@@ -1,9 +1,13 @@
-"""Rollouts, evaluations and the demonstration with the shipped policies."""
+"""Rollouts and evaluations, with policies that stand still and with the shipped ones."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from gaitshift import policy
+from gaitshift import gaits, policy
+from gaitshift.env import GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import (
     DemoConfig,
@@ -15,8 +19,12 @@ from gaitshift.evaluation import (
 )
 from gaitshift.gait_analysis import measure
 from gaitshift.log import Log
-from gaitshift.switching import Driver, HeightDifference
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.switching import Driver, HeightDifference, Scheduled
 from gaitshift.terrain import flat, from_spec
+from gaitshift.training.export import describe, export
+from gaitshift.training.learner import Learner
+from gaitshift.training.recipe import PpoConfig, Recipe
 from gaitshift.world import World
 
 
@@ -51,6 +59,71 @@ def test_robots_run_alone_as_they_run_in_a_batch(trot: policy.Policy) -> None:
         alone = run([y])
         # onnxruntime multiplies one row in another order than two: a rounding error that grows.
         np.testing.assert_allclose(together.qpos[:30, robot], alone.qpos[:30, 0], atol=1e-4)
+
+
+def _standing(folder: Path, name: str, dwell: int, speed: float) -> policy.Policy:
+    """A policy that stands still whatever it sees, of a gait at home at 100 / (2 dwell) Hz."""
+    tables = gaits.load("trot").to_dict() | {"name": name, "dwell": dwell, "speed": speed}
+    tables |= {"dwell_range": [10, 40], "speed_range": [0.1, 2.0]}
+    tables["transition"] = [way | {"dwell": dwell} for way in tables["transition"]]
+    env = GaitEnv(RewardMachine.from_dict(tables), flat(9.0, 9.0), 1, threads=1)
+    recipe = Recipe(ppo=PpoConfig(hidden=(4,)), robots=1, steps=1)
+    actor = Learner(env, recipe).ppo.actor
+    with torch.no_grad():
+        for parameter in actor.mlp.parameters():
+            parameter.zero_()
+    export(actor, describe(env, {}), folder / f"{name}.onnx")
+    return policy.load(folder / f"{name}.onnx")
+
+
+@pytest.fixture(scope="module")
+def standing(tmp_path_factory) -> dict[str, policy.Policy]:
+    """At home at 0.9 m/s and 2.5 Hz, at 0.4 m/s and 2 Hz."""
+    folder = tmp_path_factory.mktemp("standing")
+    return {
+        "quick": _standing(folder, "quick", dwell=20, speed=0.9),
+        "slow": _standing(folder, "slow", dwell=25, speed=0.4),
+    }
+
+
+def _commanded(standing: dict[str, policy.Policy], **config: float) -> np.ndarray:
+    """Commands (T, N, 3) of two robots that shift from quick to slow after 0.1 s."""
+    world = World(standing["quick"].robot, flat(9.0, 9.0), 2, threads=1)
+    return rollout(
+        world,
+        Driver(standing, 2, start="quick"),
+        RolloutConfig(seconds=0.2, **config),
+        start_xy=np.zeros((2, 2)),
+        rng=np.random.default_rng(0),
+        switcher=Scheduled(((0.1, "slow"),)),
+    ).command
+
+
+def test_robots_are_asked_for_what_their_present_gait_is_at_home_at(standing) -> None:
+    """The shift follows the tenth step, and the eleventh is the first under the new command."""
+    command = _commanded(standing)
+    assert command.shape == (20, 2, 3)
+    np.testing.assert_allclose(command[:10, :, 0], 0.9)
+    np.testing.assert_allclose(command[10:, :, 0], 0.4)
+    np.testing.assert_allclose(command[:10, :, 2], 2.5)
+    np.testing.assert_allclose(command[10:, :, 2], 2.0)
+
+
+def test_a_speed_or_frequency_that_is_given_holds_for_every_gait(standing) -> None:
+    speed, frequency = _commanded(standing, speed=0.7), _commanded(standing, stride_frequency=1.6)
+    np.testing.assert_allclose(speed[..., 0], 0.7)
+    np.testing.assert_allclose(speed[10:, :, 2], 2.0)
+    np.testing.assert_allclose(frequency[..., 2], 1.6)
+    np.testing.assert_allclose(frequency[:10, :, 0], 0.9)
+
+
+def test_an_evaluation_asks_for_what_its_config_says(standing) -> None:
+    config = EvaluationConfig(episodes=2, seconds=0.1, speed=0.5, stride_frequency=3.0)
+    command = evaluate(standing["quick"], config)[1].command
+    np.testing.assert_allclose(command[..., 0], 0.5)
+    np.testing.assert_allclose(command[..., 2], 3.0)
+    own = evaluate(standing["slow"], EvaluationConfig(episodes=2, seconds=0.1))[1].command
+    np.testing.assert_allclose(own[..., 0], 0.4)
 
 
 def _synthetic_log(*, speed: float, period: int, steps: int, fallen_from: int | None) -> Log:
@@ -124,11 +197,14 @@ def test_robots_count_until_their_fall_and_the_warm_up_does_not_count(trot: poli
 def test_shipped_policies_walk_in_their_gait(gait: str) -> None:
     """The floors of the README with room for the small sample."""
     config = EvaluationConfig(episodes=32, seconds=5.0)
-    figures, _ = evaluate(policy.load(gait), config)
+    loaded = policy.load(gait)
+    figures, _ = evaluate(loaded, config)
     assert figures["survival"] == 1.0
-    assert figures["speed_mean"] == pytest.approx(1.2, abs=0.15)
+    assert figures["speed_mean"] == pytest.approx(loaded.info.forward_speed, abs=0.15)
     assert figures["pattern_fraction"] >= 0.6
-    assert 1.5 <= figures["cycles_per_s"] <= 3.5
+    # No cycle is shorter than the commanded one; counting over 3 s errs by a cycle at most.
+    share = figures["cycles_per_s"] / loaded.info.stride_frequency
+    assert 0.7 <= share <= 1.1
 
 
 def test_the_demo_shifts_to_the_rough_gait_on_rough_ground_and_back_after_it() -> None:
