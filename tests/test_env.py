@@ -15,10 +15,11 @@ from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
-from gaitshift.terrain import flat, perlin
+from gaitshift.terrain import flat, perlin, slope
 from gaitshift.world import PushConfig
 
 FLAT = flat(20.0, 20.0)
+FEET = ("FL", "FR", "BL", "BR")
 STANCE = ANYMAL_B.stance_angles
 DWELL, SWING_HEIGHT = 3, 0.004
 EDGES = {0: ({1}, {0}, 1, 1.0), 1: ({0}, {1}, 0, 0.5)}
@@ -41,12 +42,18 @@ HOP = RewardMachine.from_dict(
         ],
     }
 )
+RANGED = replace(HOP, dwell_range=(2, 8), speed=0.9, speed_range=(0.4, 1.5))
+"""The same gait for several speeds and stride frequencies."""
 FOLD = np.array([[0.0, 4.0, -6.0] * 2 + [0.0, -4.0, 6.0] * 2])
 """An action that folds all legs, so that the body comes to the ground."""
 
 
 def hop(n=3, *, ground=FLAT, threads=1, **config):
     return GaitEnv(HOP, ground, n, config=EnvConfig(**config), threads=threads)
+
+
+def ranged(n, **config):
+    return GaitEnv(RANGED, FLAT, n, config=EnvConfig(**config), threads=1)
 
 
 def arbitrary_actions(seed, steps, n, size=1.0):
@@ -73,6 +80,28 @@ def keep_motions(env, monkeypatch):
 
     monkeypatch.setattr(env.world, "step", kept)
     return motions
+
+
+def feed(env, monkeypatch):
+    """Contacts (N, 4) to write into: the feet touch as they say, and are 0.2 m high where not."""
+    contact, step = np.ones((env.num_envs, 4), dtype=bool), env.world.step
+
+    def fed(target):
+        clearance = np.where(contact, 0.0, 0.2)
+        env.world.motion = replace(step(target), contact=contact.copy(), clearance=clearance)
+        return env.world.motion
+
+    monkeypatch.setattr(env.world, "step", fed)
+    return contact
+
+
+def commanded(env, observation):
+    """Speeds [m/s] and strides [control steps] that an observation shows, (N,) each."""
+    speed, stride = (
+        observation[:, env.observe.slices[name]][:, 0].astype(float)
+        for name in ("forward_speed_command", "stride_command")
+    )
+    return speed, 40.0 * stride  # two states in units of 20 steps
 
 
 # Gymnasium's contract ---------------------------------------------------------------------------
@@ -168,13 +197,17 @@ def test_an_episode_needs_a_step_and_a_speed_that_legs_can_run():
         EnvConfig(episode_steps=0)
     with pytest.raises(GaitshiftError, match=r"speed -0\.1 m/s: 0 to 3"):
         EnvConfig(forward_speed=-0.1)
+    with pytest.raises(GaitshiftError, match=r"command_share 1\.1: 0 to 1"):
+        EnvConfig(command_share=1.1)
+    with pytest.raises(GaitshiftError, match="command_interval 0: at least 1"):
+        EnvConfig(command_interval=0)
 
 
 # Chance -----------------------------------------------------------------------------------------
 
 
 def test_the_same_seed_gives_the_same_bits():
-    config = {"push": PushConfig(force=200.0, duration=5, interval=12), "heading_interval": 9}
+    config = {"push": PushConfig(force=200.0, duration=5, interval=12), "command_interval": 9}
     actions = arbitrary_actions(2, 50, 3)
     ways = [run(hop(3, episode_steps=20, **config), actions) for _ in range(2)]
     for one, other in zip(*ways, strict=True):
@@ -253,7 +286,7 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
 
 
 def test_no_quantity_of_the_observation_is_a_step_late(monkeypatch):
-    env = hop(3, heading_interval=1000)
+    env = hop(3, command_interval=1000)
     slices = env.observe.slices
     env.reset(seed=2)
     qpos, _ = env.world.state()
@@ -346,28 +379,163 @@ def test_writing_into_what_was_returned_changes_nothing_to_come():
             flags[:] = True
 
 
-def test_every_entry_of_the_observation_lives_but_the_commanded_speed():
-    env = hop(6, heading_interval=20)
+def test_every_entry_of_the_observation_lives():
+    env = ranged(6, command_interval=20)
     env.reset(seed=0)
     actions = arbitrary_actions(1, 120, 6, size=1.5)
     seen = np.stack([env.step(action)[0] for action in actions])
-    still = np.flatnonzero(np.ptp(seen, axis=(0, 1)) == 0)
-    speed = env.observe.slices["forward_speed_command"]
-    assert still.tolist() == list(range(speed.start, speed.stop))
+    assert (np.ptp(seen, axis=(0, 1)) > 0).all()
 
 
 def test_the_papers_environment_shows_no_command_and_asks_for_no_turn():
     env = GaitEnv(HOP, FLAT, 2, config=EnvConfig.paper(), threads=1)
     env.reset(seed=0)
-    assert not {"forward_speed_command", "yaw_rate_command", "last_action"} & set(
-        env.observe.slices
-    )
+    shown = set(env.observe.slices)
+    assert not {name for name in shown if name.endswith("_command")} | {"last_action"} & shown
     for action in arbitrary_actions(0, 5, 2, size=0.3):
         *_, info = env.step(action)
         turning = env.world.motion.base_angular_velocity_b[:, 2]
         np.testing.assert_allclose(info["reward_terms"]["yaw_rate"], -25.0 * turning**2)
         silent = {name for name, term in info["reward_terms"].items() if not term.any()}
         assert len(info["reward_terms"]) - len(silent) == 7, "the terms of Table I alone"
+
+
+# Commands ---------------------------------------------------------------------------------------
+
+
+def draws(env, resets=30):
+    """Speeds and strides of the first commands of many episodes, (resets · N,) each."""
+    seen = [commanded(env, env.reset(seed=seed)[0]) for seed in range(resets)]
+    return (np.concatenate(part) for part in zip(*seen, strict=True))
+
+
+def test_commands_are_drawn_from_the_gaits_ranges_and_reach_their_ends():
+    speed, stride = draws(ranged(10, command_share=1.0))
+    assert speed.min() == pytest.approx(0.4, abs=0.03)
+    assert speed.max() == pytest.approx(1.5, abs=0.03)
+    np.testing.assert_allclose(np.unique(np.rint(stride)), np.arange(4, 17, 2))
+    np.testing.assert_allclose(stride, np.rint(stride), atol=1e-4)
+    assert abs(np.corrcoef(speed, stride)[0, 1]) < 0.2, "each is drawn by itself"
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.6])
+def test_the_other_draws_are_the_gaits_own_speed_and_stride(share):
+    speed, stride = draws(ranged(10, command_share=share))
+    at_home = np.isclose(speed, 0.9)
+    # Of 300 draws a share of 0.3 has a standard deviation of 0.026.
+    assert np.mean(at_home) == pytest.approx(1 - share, abs=0.1)
+    # A dwell drawn between 2 and 8 is rounded to 3, the gait's own, in one case of six.
+    assert np.mean(np.isclose(stride, 6.0)) == pytest.approx(1 - share * 5 / 6, abs=0.1)
+
+
+def test_at_a_command_scale_of_0_all_is_the_gaits_own_and_in_between_ranges_shrink_towards_it():
+    env = ranged(10, command_share=1.0)
+    env.command_scale = 0.0
+    speed, stride = draws(env, resets=3)
+    np.testing.assert_allclose(speed, 0.9, rtol=1e-6)
+    np.testing.assert_allclose(stride, 6.0, rtol=1e-6)
+    env.command_scale = 0.5
+    speed, stride = draws(env)
+    # Half of the way from 0.9 to 0.4 and to 1.5; dwells between 2.5 and 5.5, rounded.
+    assert 0.65 <= speed.min() < 0.68
+    assert 1.17 < speed.max() <= 1.2
+    assert set(np.rint(stride).tolist()) == {6.0, 8.0, 10.0}
+
+
+def test_a_speed_of_the_config_takes_the_place_of_the_gaits_own():
+    speed, _ = draws(ranged(4, command_share=0.0, forward_speed=1.1), resets=2)
+    np.testing.assert_allclose(speed, 1.1, rtol=1e-6)
+
+
+def test_commands_change_at_their_interval_and_where_an_episode_begins_and_at_no_other_time():
+    env = ranged(3, episode_steps=25, command_interval=10, command_share=1.0)
+    last = commanded(env, env.reset(seed=0)[0])[0]
+    changes = []
+    for step in range(1, 51):
+        observation, *_ = env.step(np.zeros((3, 12)))
+        speed = commanded(env, observation)[0]
+        assert (speed != last).all() or (speed == last).all()
+        changes += [step] if (speed != last).all() else []
+        last = speed
+    assert changes == [9, 19, 25, 34, 44, 50]
+
+
+def test_a_commanded_stride_holds_the_machine_back_for_its_dwell_and_no_longer(monkeypatch):
+    machine = replace(HOP, dwell_range=(3, 30))
+    env = GaitEnv(machine, FLAT, 12, config=EnvConfig(command_share=1.0), threads=1)
+    dwell = np.rint(commanded(env, env.reset(seed=0)[0])[1] / 2)
+    assert dwell.min() < 8
+    assert dwell.max() > 25
+    contact = feed(env, monkeypatch)
+    first, waited = np.ones(12, dtype=bool), np.zeros(12)
+    for _ in range(100):
+        # The feet always stand as the next state has them: only the dwell holds it back.
+        contact[:, 0], contact[:, 1] = ~first, first
+        *_, info = env.step(np.zeros((12, 12)))
+        waited += 1
+        np.testing.assert_array_equal(info["changed"], waited == dwell)
+        first ^= info["changed"]
+        waited[info["changed"]] = 0
+
+
+def test_the_reward_and_the_observation_speak_of_the_same_command():
+    env = ranged(8, command_share=1.0, command_interval=10)
+    observation, _ = env.reset(seed=1)
+    for action in arbitrary_actions(0, 25, 8, size=0.2):
+        asked = commanded(env, observation)[0]
+        observation, _, _, _, info = env.step(action)
+        error = asked - info["forward_speed"]
+        np.testing.assert_allclose(
+            info["reward_terms"]["forward_velocity"], 10 * np.exp(-(error**2)), rtol=1e-5
+        )
+
+
+def test_an_environment_tells_what_may_be_commanded():
+    # Two states of 3 steps: 100 / 6 Hz; of 8 and of 2: 100 / 16 and 100 / 4 Hz.
+    assert ranged(1).commands() == {
+        "forward_speed": 0.9,
+        "speed_range": [0.4, 1.5],
+        "stride_frequency": pytest.approx(100 / 6),
+        "stride_frequency_range": [pytest.approx(6.25), pytest.approx(25.0)],
+    }
+    told = ranged(1, command_share=0.0, forward_speed=1.1).commands()
+    assert told == {
+        "forward_speed": 1.1,
+        "speed_range": [1.1, 1.1],
+        "stride_frequency": pytest.approx(100 / 6),
+        "stride_frequency_range": [pytest.approx(100 / 6)] * 2,
+    }
+
+
+# The price of a touchdown -----------------------------------------------------------------------
+
+TOUCHDOWNS = [
+    # feet of robot 0, how many of them came down | of robot 1
+    ("FL FR BL BR", None, "FL FR BL BR", None),
+    ("FL BR", 0, "", 0),
+    ("FR BL", 2, "", 0),
+    ("FR BL", 0, "BL", 1),
+    ("FR BL BR", 1, "FL BL BR", 2),
+    ("FR BR", 0, "FL FR", 1),
+    ("", 0, "FL FR BL BR", 2),
+    ("FL FR BL BR", 4, "FL FR BL BR", 0),
+]
+
+
+@pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
+def test_feet_that_come_down_are_paid_for_once_each_in_proportion_to_strictness(
+    strictness, monkeypatch
+):
+    env = hop(2)
+    env.reset(seed=0)
+    env.strictness = strictness
+    contact = feed(env, monkeypatch)
+    for one, first, other, second in TOUCHDOWNS:
+        contact[:] = [[foot in feet.split() for foot in FEET] for feet in (one, other)]
+        *_, info = env.step(np.zeros((2, 12)))
+        if first is not None:
+            expected = -10.0 * strictness * np.array([first, second])
+            np.testing.assert_allclose(info["reward_terms"]["touchdown"], expected)
 
 
 # The ends of episodes ---------------------------------------------------------------------------
@@ -510,6 +678,30 @@ def test_a_robot_that_comes_near_the_border_starts_anew_inside():
     assert ground.contains(position[1:, :2], 0.5).all()
 
 
+def test_ground_of_which_the_first_part_is_level_has_a_border_all_the_same():
+    sizes = {"length": 6.0, "width": 4.0}
+    env = hop(4, ground=(flat(6.0, 4.0), perlin(0.02, seed=0, **sizes)))
+    env.reset(seed=0)
+    position = env.world.motion.base_position_w[:, :2]
+    assert env.world.terrains[1].contains(position, env.config.terrain_margin).all()
+    env.world.place(np.arange(4), xy=np.tile([5.7, 0.0], (4, 1)), yaw=np.zeros(4))
+    _, _, _, truncated, _ = env.step(np.zeros((4, 12)))
+    assert truncated.all()
+
+
+def test_robots_share_out_grounds_and_each_starts_on_its_own():
+    sizes = {"length": 8.0, "width": 8.0}
+    grounds = [slope(12.0, **sizes), slope(12.0, towards=90.0, **sizes)]
+    env = hop(6, ground=flat(8.0, 8.0))
+    env.set_terrain(grounds)
+    env.reset(seed=0)
+    motion, rise = env.world.motion, np.tan(np.radians(12.0))
+    sole = motion.foot_position_w[..., 2] - motion.clearance
+    for robot in range(6):
+        along = motion.foot_position_w[robot, :, robot % 2]
+        np.testing.assert_allclose(sole[robot], rise * along, atol=0.01)
+
+
 def test_level_ground_has_no_border():
     env = hop(1, ground=flat(4.0, 4.0))
     env.reset(seed=0)
@@ -607,10 +799,10 @@ def test_without_pushes_a_standing_robot_stays_where_it_stands():
 
 
 @pytest.mark.parametrize("scale", [0.25, 1.0])
-def test_the_swing_scale_is_the_share_of_the_swing_height_that_feet_must_reach(scale, monkeypatch):
+def test_strictness_is_the_share_of_the_swing_height_that_feet_must_reach(scale, monkeypatch):
     asked = 0.08
     env = GaitEnv(with_swing_height(asked), FLAT, 4, config=EnvConfig(), threads=1)
-    env.swing_scale = scale
+    env.strictness = scale
     env.reset(seed=0)
     motions = keep_motions(env, monkeypatch)
     heights = []

@@ -1,9 +1,13 @@
-"""Rollouts, evaluations and the demonstration with the shipped policies."""
+"""Rollouts and evaluations, with policies that stand still and with the shipped ones."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from gaitshift import policy
+from gaitshift import gaits, policy
+from gaitshift.env import GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import (
     DemoConfig,
@@ -14,8 +18,12 @@ from gaitshift.evaluation import (
     run_demo,
 )
 from gaitshift.log import Log
-from gaitshift.switching import Driver, HeightDifference
+from gaitshift.reward_machine import RewardMachine
+from gaitshift.switching import Driver, HeightDifference, Scheduled
 from gaitshift.terrain import flat, from_spec
+from gaitshift.training.export import describe, export
+from gaitshift.training.learner import Learner
+from gaitshift.training.recipe import PpoConfig, Recipe
 from gaitshift.world import World
 
 
@@ -50,6 +58,71 @@ def test_robots_run_alone_as_they_run_in_a_batch(trot: policy.Policy) -> None:
         alone = run([y])
         # onnxruntime multiplies one row in another order than two: a rounding error that grows.
         np.testing.assert_allclose(together.qpos[:30, robot], alone.qpos[:30, 0], atol=1e-4)
+
+
+def _standing(folder: Path, name: str, dwell: int, speed: float) -> policy.Policy:
+    """A policy that stands still whatever it sees, of a gait at home at 100 / (2 dwell) Hz."""
+    tables = gaits.load("trot").to_dict() | {"name": name, "dwell": dwell, "speed": speed}
+    tables |= {"dwell_range": [10, 40], "speed_range": [0.1, 2.0]}
+    tables["transition"] = [way | {"dwell": dwell} for way in tables["transition"]]
+    env = GaitEnv(RewardMachine.from_dict(tables), flat(9.0, 9.0), 1, threads=1)
+    recipe = Recipe(ppo=PpoConfig(hidden=(4,)), robots=1, steps=1)
+    actor = Learner(env, recipe).ppo.actor
+    with torch.no_grad():
+        for parameter in actor.mlp.parameters():
+            parameter.zero_()
+    export(actor, describe(env, {}), folder / f"{name}.onnx")
+    return policy.load(folder / f"{name}.onnx")
+
+
+@pytest.fixture(scope="module")
+def standing(tmp_path_factory) -> dict[str, policy.Policy]:
+    """At home at 0.9 m/s and 2.5 Hz, at 0.4 m/s and 2 Hz."""
+    folder = tmp_path_factory.mktemp("standing")
+    return {
+        "quick": _standing(folder, "quick", dwell=20, speed=0.9),
+        "slow": _standing(folder, "slow", dwell=25, speed=0.4),
+    }
+
+
+def _commanded(standing: dict[str, policy.Policy], **config: float) -> np.ndarray:
+    """Commands (T, N, 3) of two robots that shift from quick to slow after 0.1 s."""
+    world = World(standing["quick"].robot, flat(9.0, 9.0), 2, threads=1)
+    return rollout(
+        world,
+        Driver(standing, 2, start="quick"),
+        RolloutConfig(seconds=0.2, **config),
+        start_xy=np.zeros((2, 2)),
+        rng=np.random.default_rng(0),
+        switcher=Scheduled(((0.1, "slow"),)),
+    ).command
+
+
+def test_robots_are_asked_for_what_their_present_gait_is_at_home_at(standing) -> None:
+    """The shift follows the tenth step, and the eleventh is the first under the new command."""
+    command = _commanded(standing)
+    assert command.shape == (20, 2, 3)
+    np.testing.assert_allclose(command[:10, :, 0], 0.9)
+    np.testing.assert_allclose(command[10:, :, 0], 0.4)
+    np.testing.assert_allclose(command[:10, :, 2], 2.5)
+    np.testing.assert_allclose(command[10:, :, 2], 2.0)
+
+
+def test_a_speed_or_frequency_that_is_given_holds_for_every_gait(standing) -> None:
+    speed, frequency = _commanded(standing, speed=0.7), _commanded(standing, stride_frequency=1.6)
+    np.testing.assert_allclose(speed[..., 0], 0.7)
+    np.testing.assert_allclose(speed[10:, :, 2], 2.0)
+    np.testing.assert_allclose(frequency[..., 2], 1.6)
+    np.testing.assert_allclose(frequency[:10, :, 0], 0.9)
+
+
+def test_an_evaluation_asks_for_what_its_config_says(standing) -> None:
+    config = EvaluationConfig(episodes=2, seconds=0.1, speed=0.5, stride_frequency=3.0)
+    command = evaluate(standing["quick"], config)[1].command
+    np.testing.assert_allclose(command[..., 0], 0.5)
+    np.testing.assert_allclose(command[..., 2], 3.0)
+    own = evaluate(standing["slow"], EvaluationConfig(episodes=2, seconds=0.1))[1].command
+    np.testing.assert_allclose(own[..., 0], 0.4)
 
 
 @pytest.mark.parametrize("gait", policy.shipped())
@@ -97,6 +170,10 @@ def test_a_schedule_is_kept_to_the_step() -> None:
         (lambda: EvaluationConfig(episodes=0), "0 episodes: 1 to 100000"),
         (lambda: EvaluationConfig(seconds=-1.0), "-1.0 seconds: more than 0"),
         (lambda: EvaluationConfig(seed=-1), "seed -1"),
+        (lambda: EvaluationConfig(speed=-0.1), "-0.1 m/s: 0 to 3 m/s"),
+        (lambda: EvaluationConfig(speed=float("nan")), "nan m/s: 0 to 3 m/s"),
+        (lambda: EvaluationConfig(stride_frequency=0.0), "0.0 Hz: more than 0, up to 100 Hz"),
+        (lambda: EvaluationConfig(stride_frequency=101.0), "101.0 Hz: more than 0, up to 100 Hz"),
         (lambda: DemoConfig(episodes=0), "0 episodes"),
         (lambda: DemoConfig(gaits=("trot",)), "one gait alone"),
         (lambda: DemoConfig(gaits=("trot", "pace"), at=(1.0, 2.0)), "2 times for 2 gaits"),
@@ -143,7 +220,7 @@ def test_ground_that_every_seed_makes_alike_is_made_once() -> None:
 def test_grounds_of_an_evaluation_reach_as_far_as_robots_can_walk() -> None:
     from gaitshift.evaluation.evaluate import RUN_UP, _grounds
 
-    grounds = _grounds(EvaluationConfig(terrain="perlin:0.1"), 1.2)
+    grounds = _grounds(EvaluationConfig(terrain="perlin:0.1", seconds=10.0), 1.2)
     assert len(grounds) == 8
     assert all(g.extent[0] == -RUN_UP and g.extent[1] > 1.2 * 10.0 + 1.0 for g in grounds)
     assert len({g.height.tobytes() for g in grounds}) == 8

@@ -9,12 +9,34 @@ from gaitshift import gaits
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine import RewardMachine, draw
 
+FEET = ("FL", "FR", "BL", "BR")
 SHIPPED = {
-    # gait: (stances in turn, ideal phases FL FR BL BR, its states in a mirror)
-    "bound": (["FL FR", "BL BR"], (0.0, 0.0, 0.5, 0.5), (0, 1)),
-    "pace": (["FL BL", "FR BR"], (0.0, 0.5, 0.0, 0.5), (1, 0)),
-    "trot": (["FL BR", "FR BL"], (0.0, 0.5, 0.5, 0.0), (1, 0)),
+    # gait: (stances in turn, ideal phases, touchdowns on a cycle, its states in a mirror)
+    "bound": (["FL FR", "BL BR"], (0.0, 0.0, 0.5, 0.5), (1, 1, 1, 1), (0, 1)),
+    "gallop": (["BR", "BL", "FR", "FL"], (0.0, 0.8, 0.5, 0.3), (1, 1, 1, 1), None),
+    "half_bound": (
+        ["FL FR", "BR", "FL FR", "BL"],
+        (0.0, 0.0, 0.5, 0.5),
+        (2, 2, 1, 1),
+        (2, 3, 0, 1),
+    ),
+    "pace": (["FL BL", "FR BR"], (0.0, 0.5, 0.0, 0.5), (1, 1, 1, 1), (1, 0)),
+    "pronk": (["FL FR BL BR", ""], (0.0, 0.0, 0.0, 0.0), (1, 1, 1, 1), (0, 1)),
+    "three_one": (
+        ["FL BL BR", "FL", "FR BL BR", "FR"],
+        (0.0, 0.5, 0.0, 0.0),
+        (1, 1, 2, 2),
+        (2, 3, 0, 1),
+    ),
+    "trot": (["FL BR", "FR BL"], (0.0, 0.5, 0.5, 0.0), (1, 1, 1, 1), (1, 0)),
+    "walk": (
+        ["FR BL BR", "FL FR BL", "FL BL BR", "FL FR BR"],
+        (0.0, 0.5, 0.75, 0.25),
+        (1, 1, 1, 1),
+        (2, 3, 0, 1),
+    ),
 }
+"""Dwells, heights and speeds are found by training, and stand in the gait files alone."""
 HEAD = """
 name = "{name}"
 title = "A gait of mine"
@@ -25,56 +47,6 @@ ideal_phase = {{ FL = 0, FR = 0.5, BL = 0.75, BR = 0.25 }}
 """
 OTHERS = {
     # gait: (its tables, stances in turn, its states in a mirror)
-    "pronk": (
-        """
-        state = [
-            { name = "all", stance = ["FL", "FR", "BL", "BR"] },
-            { name = "none", stance = [] },
-        ]
-        transition = [
-            { from = "all", to = "none", down = [], up = ["FL", "FR", "BL", "BR"] },
-            { from = "none", to = "all", down = ["FL", "FR", "BL", "BR"], up = [] },
-        ]
-        """,
-        ["FL FR BL BR", ""],
-        (0, 1),
-    ),
-    "walk": (
-        """
-        state = [
-            { name = "FL_lifted", stance = ["FR", "BL", "BR"] },
-            { name = "BR_lifted", stance = ["FL", "FR", "BL"] },
-            { name = "FR_lifted", stance = ["FL", "BL", "BR"] },
-            { name = "BL_lifted", stance = ["FL", "FR", "BR"] },
-        ]
-        transition = [
-            { from = "FL_lifted", to = "BR_lifted", down = ["FL", "FR", "BL"], up = ["BR"] },
-            { from = "BR_lifted", to = "FR_lifted", down = ["FL", "BL", "BR"], up = ["FR"] },
-            { from = "FR_lifted", to = "BL_lifted", down = ["FL", "FR", "BR"], up = ["BL"] },
-            { from = "BL_lifted", to = "FL_lifted", down = ["FR", "BL", "BR"], up = ["FL"] },
-        ]
-        """,
-        ["FR BL BR", "FL FR BL", "FL BL BR", "FL FR BR"],
-        (2, 3, 0, 1),
-    ),
-    "three-one": (
-        """
-        state = [
-            { name = "FL_and_hind", stance = ["FL", "BL", "BR"] },
-            { name = "FL", stance = ["FL"] },
-            { name = "FR_and_hind", stance = ["FR", "BL", "BR"] },
-            { name = "FR", stance = ["FR"] },
-        ]
-        transition = [
-            { from = "FL_and_hind", to = "FL", down = ["FL"], up = ["FR", "BL", "BR"] },
-            { from = "FL", to = "FR_and_hind", down = ["FR", "BL", "BR"], up = ["FL"], dwell = 6 },
-            { from = "FR_and_hind", to = "FR", down = ["FR"], up = ["FL", "BL", "BR"] },
-            { from = "FR", to = "FL_and_hind", down = ["FL", "BL", "BR"], up = ["FR"], dwell = 6 },
-        ]
-        """,
-        ["FL BL BR", "FL", "FR BL BR", "FR"],
-        (2, 3, 0, 1),
-    ),
     "half-bound": (
         """
         state = [
@@ -116,7 +88,7 @@ OTHERS = {
 
 
 def contact(stance):
-    return np.array([[foot in stance.split() for foot in ("FL", "FR", "BL", "BR")]])
+    return np.array([[foot in stance.split() for foot in FEET]])
 
 
 def assert_stances_in_turn_walk_the_states(machine, stances):
@@ -135,18 +107,69 @@ def test_every_shipped_gait_stands_in_the_table():
 
 @pytest.mark.parametrize("name", sorted(SHIPPED))
 def test_a_shipped_gait_is_what_the_table_says(name):
-    stances, phases, mirror = SHIPPED[name]
+    stances, phases, touchdowns, mirror = SHIPPED[name]
     machine = gaits.load(name)
     assert machine.name == name
     assert machine.ideal_phase == phases
     assert machine.accepting == ()
     assert len(machine.states) == len(stances)
     assert machine.mirrored_states() == mirror
+    assert machine.cycle == tuple(range(len(stances)))
+    assert machine.touchdowns == touchdowns
     assert_stances_in_turn_walk_the_states(machine, stances)
     assert RewardMachine.from_dict(machine.to_dict()) == machine
     for edge in machine.edges:
-        assert (edge.guard.dwell, edge.guard.swing_height, edge.bonus) == (20, 0.03, 1.0)
-        assert edge.guard.down | edge.guard.up == {"FL", "FR", "BL", "BR"}
+        assert edge.guard.down | edge.guard.up == set(FEET)
+        assert edge.guard.swing_height > 0
+        assert edge.bonus == 1.0
+
+
+def onsets(name):
+    """Steps of an ideal cycle in which each foot comes down, and the length of the cycle.
+
+    The stances of the table, each shown for as long as the guard of the edge that leaves it asks.
+    """
+    machine = gaits.load(name)
+    shown = [
+        (stance, edge.guard.dwell)
+        for stance, edge in zip(SHIPPED[name][0], machine.edges, strict=True)
+    ]
+    feet = [[foot in stance.split() for foot in FEET] for stance, dwell in shown]
+    down = np.repeat(feet, [dwell for _, dwell in shown], axis=0)
+    began = down & ~np.roll(down, 1, axis=0)
+    return [np.flatnonzero(began[:, foot]) for foot in range(4)], len(down)
+
+
+@pytest.mark.parametrize("name", sorted(SHIPPED))
+def test_ideal_phases_and_touchdowns_are_those_of_the_cycle_walked_step_by_step(name):
+    machine, (steps, length) = gaits.load(name), onsets(name)
+    assert machine.stride() == length
+    assert machine.touchdowns == tuple(len(onset) for onset in steps)
+    # A phase is the time since FL came down over its stride, which is half of a cycle in the
+    # half-bound. The hind feet of the three-one come down twice in it: one of them is the norm.
+    stride = length / len(steps[0])
+    for foot, ideal in enumerate(machine.ideal_phase):
+        phases = (steps[foot] - steps[0][0]) / stride
+        away = np.abs((phases - ideal + 0.5) % 1.0 - 0.5)
+        assert away.min() < 0.01, f"{FEET[foot]} comes down at {phases}, not {ideal}"
+
+
+@pytest.mark.parametrize("name", sorted(SHIPPED))
+def test_what_may_be_commanded_of_a_gait_lies_about_its_own(name):
+    machine = gaits.load(name)
+    slow, fast = machine.speed_range
+    assert 0 < slow < machine.speed < fast
+    assert machine.dwell_range[0] <= machine.dwell <= machine.dwell_range[1]
+    # Every dwell in range is reached by the stride it makes, or by one that makes the same.
+    for dwell in range(machine.dwell_range[0], machine.dwell_range[1] + 1):
+        reached = machine.dwell_for(np.array([float(machine.stride(dwell))])).item()
+        assert machine.stride(reached) == machine.stride(dwell)
+
+
+def test_the_single_foot_phases_of_the_three_one_are_half_as_long():
+    times = [edge.guard.dwell for edge in gaits.load("three_one").edges]
+    assert times[0] == times[2]
+    assert times[1] == times[3] == pytest.approx(times[0] / 2, abs=0.5)
 
 
 @pytest.mark.parametrize("name", sorted(OTHERS))
@@ -182,8 +205,12 @@ def test_a_file_with_windows_line_ends_and_a_byte_order_mark_loads(tmp_path):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("trott", r"unknown gait 'trott'; did you mean 'trot'\? gaits are bound, pace, trot"),
-        ("gallop", "unknown gait 'gallop'; gaits are bound, pace, trot; for a file of your own"),
+        (
+            "trott",
+            r"unknown gait 'trott'; did you mean 'trot'\? gaits are bound, gallop, half_bound,"
+            " pace, pronk, three_one, trot, walk; for a file of your own",
+        ),
+        ("canter", "unknown gait 'canter'; gaits are bound, gallop"),
         ("", "unknown gait ''; gaits are"),
         ("../gaits/trot", "unknown gait"),
         ("no/such.toml", "no/such.toml: there is no such file"),

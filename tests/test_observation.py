@@ -56,9 +56,10 @@ SIZES = {
     "contact": 4,
     "forward_speed_command": 1,
     "yaw_rate_command": 1,
+    "stride_command": 1,
     "last_action": 12,
 }
-"""S × U in the paper's order (III-C), then the command and the last action."""
+"""S × U in the paper's order (III-C), then the commands and the last action."""
 
 
 def two_robots():
@@ -91,7 +92,11 @@ def two_robots():
         machine_state=np.array([0, 1]),
         steps_in_state=np.array([7, 260]),
         motion=motion,
-        command=Command(forward_speed=np.array([1.2, 0.4]), yaw_rate=np.array([-0.3, 0.2])),
+        command=Command(
+            forward_speed=np.array([1.2, 0.4]),
+            yaw_rate=np.array([-0.3, 0.2]),
+            stride_frequency=np.array([2.5, 1.6]),
+        ),
         last_action=np.stack([0.5 * ramp, -ramp]),
         stance=STANCE,
     )
@@ -120,6 +125,8 @@ HAND_TABLE = {
     "contact": [[1, 0, 0, 0], [0, 1, 1, 0]],
     "forward_speed_command": [[1.2], [0.4]],
     "yaw_rate_command": [[-0.3], [0.2]],
+    # A stride of 0.4 s is 40 steps, two states of 20 each; one of 0.625 s, two of 31.25 each.
+    "stride_command": [[1.0], [1.5625]],
     "last_action": [
         [0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6],
         [-1, -2, -3, -4, -5, -6, -7, -8, -9, -10, -11, -12],
@@ -265,7 +272,7 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
     state = pair(np.zeros(robots, dtype=int), np.ones(robots, dtype=int))
     steps_in_state = np.zeros(2 * robots, dtype=int)
     action = np.zeros((2 * robots, 12))
-    turn = rng.uniform(-0.5, 0.5, robots)
+    turn, frequency = rng.uniform(-0.5, 0.5, robots), rng.uniform(1.5, 3.0, robots)
     seen = []
     for _ in range(steps):
         action = joint_pair(0.8 * action[:robots] + 0.15 * rng.normal(size=(robots, 12)))
@@ -276,7 +283,11 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
             machine_state=state,
             steps_in_state=steps_in_state,
             motion=motion,
-            command=Command(forward_speed=np.full(2 * robots, 1.2), yaw_rate=pair(turn, -turn)),
+            command=Command(
+                forward_speed=np.full(2 * robots, 1.2),
+                yaw_rate=pair(turn, -turn),
+                stride_frequency=pair(frequency, frequency),
+            ),
             last_action=action,
             stance=stance,
         )

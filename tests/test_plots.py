@@ -65,7 +65,7 @@ def course(steps: int = 200) -> Log:
         machine_state=np.zeros((steps, 2), dtype=int),
         stance_shown=np.ones((steps, 2), dtype=bool),
         fallen=np.stack([np.zeros(steps, dtype=bool), time - 1.0 >= FALL], axis=1),
-        command=np.tile([1.2, 0.0], (steps, 2, 1)),
+        command=np.tile([1.2, 0.0, 2.5], (steps, 2, 1)),
         gaits=("trot", "bound"),
         robot="anymal_b",
         terrain="step:0.1",

@@ -15,6 +15,7 @@ from gaitshift import gaits, policy
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.policy import PolicyInfo
+from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
 from gaitshift.training.learner import Learner, as_tensors
@@ -150,6 +151,35 @@ def test_the_description_names_the_environment_it_was_trained_in():
     assert info.machine["name"] == "bound"
 
 
+def ranged(machine, **config):
+    """The description of a policy for this machine, whose own stride is 2 · 20 steps."""
+    tables = machine.to_dict() | {"dwell": 20, "dwell_range": [16, 25]}
+    tables |= {"speed": 0.8, "speed_range": [0.5, 1.25]}
+    for way in tables["transition"]:
+        way["dwell"] = 20
+    env = GaitEnv(
+        RewardMachine.from_dict(tables), flat(9.0, 9.0), 1, config=EnvConfig(**config), threads=1
+    )
+    return describe(env, TRAINING)
+
+
+def test_the_description_tells_the_commands_it_was_trained_for(made, tmp_path):
+    info = ranged(gaits.load("trot"))
+    assert (info.forward_speed, info.speed_range) == (0.8, [0.5, 1.25])
+    # 100 control steps a second over 2 · 20, 2 · 25 and 2 · 16 of them.
+    assert info.stride_frequency == pytest.approx(2.5)
+    assert info.stride_frequency_range == pytest.approx([2.0, 3.125])
+    path = tmp_path / "policy.onnx"
+    export(made[0], info, path)
+    assert policy.load(path).info == info
+
+
+def test_a_policy_trained_for_one_command_says_so():
+    info = ranged(gaits.load("trot"), command_share=0.0, forward_speed=1.1)
+    assert (info.forward_speed, info.speed_range) == (1.1, [1.1, 1.1])
+    assert info.stride_frequency_range == [info.stride_frequency] * 2
+
+
 def test_the_policy_wants_the_observation_it_was_trained_on(tmp_path):
     names = ("last_action", "contact", "machine_state", "base_height")
     env, actor = untrained(2, config=EnvConfig(observed=names))
@@ -239,7 +269,7 @@ def test_an_onnx_file_of_somebody_else_is_refused(tmp_path):
 
 
 def test_another_format_version_is_refused(altered):
-    assert "format version 99; this gaitshift reads 1" in refusal(altered(format_version="99"))
+    assert "format version 99; this gaitshift reads 2" in refusal(altered(format_version="99"))
 
 
 def test_another_robot_is_refused_with_those_there_are(altered):

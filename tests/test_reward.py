@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from gaitshift.command import Command
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
-from gaitshift.reward import BONUS_MODES, RewardConfig, walk_reward, with_bonus
+from gaitshift.reward import ADDITIONS, BONUS_MODES, RewardConfig, walk_reward, with_bonus
 
 TABLE_I = {
     "forward_velocity": 10.0,
@@ -28,6 +28,7 @@ CONFIG = replace(
     stance_feet=5.0,
     stance_pattern=3.0,
     slip=-0.5,
+    touchdown=-7.0,
     action_rate=-0.02,
 )
 """Table I and round numbers for what is ours."""
@@ -89,10 +90,13 @@ def three_robots():
     return {
         "motion": Motion(**fields),
         "command": Command(
-            forward_speed=np.array([1.2, 0.2, 1.2]), yaw_rate=np.array([0.1, -0.2, 0.0])
+            forward_speed=np.array([1.2, 0.2, 1.2]),
+            yaw_rate=np.array([0.1, -0.2, 0.0]),
+            stride_frequency=np.array([1.5, 2.5, 3.5]),
         ),
         "stance": STANCE,
         "agreement": np.array([1.0, 0.75, 0.5]),
+        "touchdowns": np.array([2.0, 0.0, 0.75]),
         "action_change": np.stack([0.1 * RAMP, np.zeros(12), -np.ones(12)]),
     }
 
@@ -122,6 +126,8 @@ HAND_TABLE = {
     "stance_pattern": (3.0, 0.0, 0.0),
     # -0.5 (FL 0.01 + 0.04, BL 0.09 + 0.16); no foot down; -0.5 (FR 0.36 + 0.64, BR 0.04)
     "slip": (-0.15, 0.0, -0.52),
+    # -7 · two feet; no foot; -7 · three feet at a strictness of a quarter
+    "touchdown": (-14.0, 0.0, -5.25),
     # -0.02 · 0.01 · 650; nothing; -0.02 · 12
     "action_rate": (-0.13, 0.0, -0.24),
 }
@@ -142,6 +148,11 @@ def test_the_paper_preset_is_table_i_and_b_and_nothing_else():
     assert weights == {**TABLE_I, "bonus": 200.0, "bonus_mode": "add"}
 
 
+def test_the_additions_are_the_terms_that_table_i_lacks():
+    assert set(ADDITIONS) == set(HAND_TABLE) - set(TABLE_I)
+    assert len(set(ADDITIONS)) == len(ADDITIONS)
+
+
 def test_a_weight_of_zero_silences_its_term():
     for name in HAND_TABLE:
         terms = walk_reward(replace(CONFIG, **{name: 0.0}), **three_robots())
@@ -157,9 +168,14 @@ def test_perfect_motion_earns_every_reward_whole_and_no_penalty():
     terms = walk_reward(
         CONFIG,
         Motion(**fields),
-        Command(forward_speed=np.array([0.9]), yaw_rate=np.array([0.3])),
+        Command(
+            forward_speed=np.array([0.9]),
+            yaw_rate=np.array([0.3]),
+            stride_frequency=np.array([2.0]),
+        ),
         stance=STANCE,
         agreement=np.ones(1),
+        touchdowns=np.zeros(1),
         action_change=np.zeros((1, 12)),
     )
     earned = {name: term.item() for name, term in terms.items() if term.item() != 0}

@@ -109,7 +109,12 @@ def machines(draw_from):
                 break
     if any(t["to"] == f"u{count}" for t in transitions):
         states.append({"name": f"u{count}", "accepting": True})
-    return TROT | {"dwell": pick(st.integers(0, 6)), "state": states, "transition": transitions}
+    dwell = pick(st.integers(0, 6))
+    tables = TROT | {"dwell": dwell, "state": states, "transition": transitions}
+    if pick(st.booleans()):
+        tables["dwell_range"] = [pick(st.integers(0, dwell)), dwell + pick(st.integers(0, 9))]
+        tables |= {"speed": 0.5, "speed_range": [0.25, 0.75]}
+    return tables
 
 
 EXTRAS = st.fixed_dictionaries(
@@ -317,6 +322,81 @@ def test_dwell_command_takes_the_place_of_the_file_and_keeps_proportions():
         assert told.changed.tolist() == [False, True, False, True]
 
 
+# The cycle --------------------------------------------------------------------------------------
+
+RANGED = TROT | {"dwell_range": [15, 30]}
+LIMP = deepcopy(RANGED)
+LIMP["transition"][1]["dwell"] = 10
+"""A trot that stays half as long on its second diagonal."""
+
+
+@pytest.mark.parametrize(
+    ("tables", "strides"),
+    [
+        (RANGED, {None: 40, 20: 40, 15: 30, 30: 60, 1: 2, 0: 2}),
+        # 17 and half of it, 8.5, rounded up; a state lasts at least the step in which it is left
+        (LIMP, {None: 30, 20: 30, 17: 26, 18: 27, 15: 23, 1: 2, 0: 2}),
+        (TROT | {"dwell": 0}, {None: 2, 0: 2, 7: 14}),
+    ],
+)
+def test_the_stride_is_the_sum_of_the_dwells_each_rounded_up(tables, strides):
+    machine = RewardMachine.from_dict(tables)
+    assert {dwell: machine.stride(dwell) for dwell in strides} == strides
+
+
+@pytest.mark.parametrize(
+    ("tables", "dwells"),
+    [
+        # strides of 30, 32, 34 … 60 steps; of two that are as near the shorter
+        (RANGED, {40.0: 20, 33.0: 16, 33.1: 17, 10.0: 15, 59.2: 30, 1e6: 30}),
+        # strides of 23, 24, 26, 27, 29, 30, 32 … 45 steps for dwells of 15, 16, 17 …
+        (LIMP, {23.4: 15, 25.0: 16, 26.0: 17, 28.2: 19, 45.0: 30}),
+        (TROT, {40.0: 20, 10.0: 20, 90.0: 20}),
+    ],
+)
+def test_the_dwell_for_a_stride_is_the_one_in_range_whose_stride_is_nearest(tables, dwells):
+    machine = RewardMachine.from_dict(tables)
+    told = machine.dwell_for(np.array(list(dwells)))
+    assert told.tolist() == list(dwells.values())
+
+
+@quick
+@given(tables=machines(), command=st.integers(0, 9))
+def test_feet_that_never_dally_go_once_round_in_a_stride(tables, command):
+    machine = RewardMachine.from_dict(tables)
+    state, waited, taken, steps = 0, 0, [], 0
+    edges = [machine.edges[number] for number in machine.cycle]
+    assume(edges[-1].target == machine.states[0].name)
+    while len(taken) < len(edges) and steps < 1000:
+        label = sorted(machine.edges[machine.cycle[len(taken)]].guard.down)
+        told = machine.step(
+            ints(state), contacts(" ".join(label)), high(1), ints(waited), dwell=command
+        )
+        state, waited = told.state[0], 0 if told.changed[0] else waited + 1
+        taken += [machine.states[state].name] if told.changed[0] else []
+        steps += 1
+    assert taken == [edge.target for edge in edges]
+    assert steps == machine.stride(command)
+
+
+def test_the_cycle_takes_the_first_way_out_and_ends_where_there_is_none():
+    sink = {"name": "sink", "accepting": True}
+    out = {"from": "FR_BL", "to": "sink", "down": [], "up": list(FEET)}
+    there, back = TROT["transition"]
+
+    def round_trip(*ways):
+        machine = RewardMachine.from_dict(edited(state=[*TROT["state"], sink], transition=[*ways]))
+        return machine.cycle, machine.touchdowns
+
+    assert round_trip(there, back, out) == ((0, 1), (1, 1, 1, 1))
+    assert round_trip(back, out, there) == ((2, 0), (1, 1, 1, 1))
+    # The run ends on its second stance: FR and BL have come down, and nobody comes back.
+    assert round_trip(there, out, back) == ((0, 1), (0, 1, 1, 0))
+
+
+# Feet that are up -------------------------------------------------------------------------------
+
+
 @pytest.mark.parametrize(
     ("clearance", "scale", "changes"),
     [
@@ -455,6 +535,28 @@ FAULTS = [
     (edited(dwell=1001), "dwell must be 0 to 1000 control steps, not 1001"),
     (edited(swing_height=float("nan")), "swing_height must be 0 to 0.3 m, not nan"),
     (edited(dwel=3), "unknown key 'dwel'; did you mean 'dwell'? keys are name, title, description"),
+    (
+        edited(dwell_range=[25, 15]),
+        "dwell_range must be two numbers, rising, with dwell = 20 in between, not 25 to 15",
+    ),
+    (edited(dwell_range=[21, 30]), "dwell_range must be two numbers, rising, with dwell = 20 in"),
+    (edited(dwell_range=[-1, 30]), "dwell_range must be two numbers, rising, with dwell = 20 in"),
+    (edited(dwell_range=[10, 20.5]), "dwell_range must be two whole numbers of control steps"),
+    (edited(dwell_range=[10, float("inf")]), "dwell_range must be two whole numbers of control"),
+    (edited(dwell_range=[float("nan"), 30]), "dwell_range must be two whole numbers of control"),
+    (edited(dwell_range=[10, 1001]), "dwell must be 0 to 1000 control steps, not 1001"),
+    (edited(dwell_range=[20]), "'dwell_range' must be two numbers, such as [0.4, 1.6], not [20]"),
+    (edited(dwell_range=20), "'dwell_range' must be two numbers, such as"),
+    (edited(dwell_range=[True, 30]), "'dwell_range' must be two numbers, such as"),
+    (edited(speed_range=[0.4, 10**400]), "'speed_range' must be two numbers of a usual size"),
+    (edited(speed="fast"), "'speed' must be a number, not 'fast'"),
+    (edited(speed=-0.1), "speed_range must be two numbers, rising, with speed = -0.1 in between"),
+    (
+        edited(speed=0.9, speed_range=[1.0, 1.6]),
+        "speed_range must be two numbers, rising, with speed = 0.9 in between, not 1 to 1.6",
+    ),
+    (edited(speed_range=[0.4, 3.1]), "speed_range must end at 3 m/s or below"),
+    (edited(speed=float("nan")), "speed_range must be two numbers, rising, with speed = nan"),
     (edited(name="my trot"), "name 'my trot' must be letters, digits, '_' and '-', a letter first"),
     (edited(title=3), "'title' must be a text, not 3"),
     (edited(ideal_phase=[0, 0.5, 0.5, 0]), "ideal_phase: must be a table of keys and values"),
@@ -522,6 +624,7 @@ def test_a_folder_is_not_a_gait_file(tmp_path):
         read_toml(tmp_path)
 
 
+RANGES = ("dwell_range", "speed", "speed_range")
 values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=3) | st.just("FL"),
     lambda inner: (
@@ -533,10 +636,20 @@ values = st.recursive(
 
 
 @quick
-@given(changes=st.dictionaries(st.sampled_from(sorted(TROT)), values, min_size=1, max_size=2))
+@given(changes=st.dictionaries(st.sampled_from([*TROT, *RANGES]), values, min_size=1, max_size=2))
 def test_whatever_a_file_holds_the_error_is_ours(changes):
     with suppress(GaitshiftError):
         RewardMachine.from_dict(TROT | changes)
+
+
+def test_ranges_are_read_and_left_out_they_are_the_gaits_own_value_alone():
+    told = RewardMachine.from_dict(
+        TROT | {"dwell_range": [15, 25], "speed": 0.8, "speed_range": [0.5, 1]}
+    )
+    assert (told.dwell_range, told.speed, told.speed_range) == ((15, 25), 0.8, (0.5, 1.0))
+    silent = RewardMachine.from_dict(TROT)
+    # 1.2 m/s is the paper's speed.
+    assert (silent.dwell_range, silent.speed, silent.speed_range) == ((20, 20), 1.2, (1.2, 1.2))
 
 
 # Files and drawings -----------------------------------------------------------------------------

@@ -26,10 +26,10 @@ FEET = ("FL", "FR", "BL", "BR")
 BASE_HEIGHT = 0.5
 
 
-def exported(folder, machine, *, seed=0, constant=None, gains="default"):
+def exported(folder, machine, *, seed=0, constant=None, gains="default", speed=None):
     """An untrained policy of a machine; with `constant` its twelve actions are always those."""
     torch.manual_seed(seed)
-    config = EnvConfig(gains=gains)
+    config = EnvConfig(gains=gains, forward_speed=speed)
     env = GaitEnv(machine, flat(10.0, 10.0), 1, config=config, threads=1)
     recipe = Recipe(env=config, ppo=PpoConfig(hidden=(16,)), robots=1, steps=1)
     actor = Learner(env, recipe).ppo.actor
@@ -137,18 +137,19 @@ def test_the_driver_shows_a_policy_what_its_training_environment_shows_it(tmp_pa
         }
     )
     shuffle = exported(tmp_path, machine, seed=5)
-    config = EnvConfig(heading_range=0.0)
+    config = EnvConfig(heading_range=0.0, forward_speed=0.9, command_share=0.0)
     env = GaitEnv(machine, flat(20.0, 20.0), 3, config=config, threads=1)
     driver = Driver({"shuffle": shuffle}, 3, start="shuffle")
     observation, _ = env.reset(seed=0)
     changes = 0
     for _ in range(80):
         action = shuffle(observation)
-        target = driver.act(env.world.motion, Command.straight(3, config.forward_speed))
+        command = Command.straight(3, 0.9, stride_frequency=25.0)  # a cycle of 2 · 2 steps
+        target = driver.act(env.world.motion, command)
         np.testing.assert_allclose(target, STANCE + ANYMAL_B.action_scale * action, atol=1e-6)
         observation, _, terminated, _, info = env.step(action)
         assert not terminated.any()
-        driver.see(env.world.motion)
+        driver.see(env.world.motion, command)
         changes += int(info["changed"].sum())
     assert changes > 5
 
@@ -161,7 +162,9 @@ def test_a_batch_of_robots_is_driven_as_each_alone_would_be(policies):
     together = 0
     for step, motion in enumerate(staggering(n, 40)):
         command = Command(
-            forward_speed=np.array([1.2, 0.8, 0.4, 1.0]), yaw_rate=np.array([0.1, -0.2, 0.3, 0.0])
+            forward_speed=np.array([1.2, 0.8, 0.4, 1.0]),
+            yaw_rate=np.array([0.1, -0.2, 0.3, 0.0]),
+            stride_frequency=np.array([2.5, 1.5, 2.9, 2.0]),
         )
         target = driver.act(motion, command)
         driver.see(motion, command)
@@ -169,7 +172,7 @@ def test_a_batch_of_robots_is_driven_as_each_alone_would_be(policies):
             ids = np.array([robot])
             own = one.act(motion.of(ids), command.of(ids))
             np.testing.assert_allclose(own[0], target[robot], rtol=1e-5, atol=1e-6)
-            one.see(motion.of(ids))
+            one.see(motion.of(ids), command.of(ids))
             assert one.machine_state[0] == driver.machine_state[robot]
             assert one.steps_in_state[0] == driver.steps_in_state[robot]
         ids, gait = plan.get(step, ([], "trot"))
@@ -186,8 +189,8 @@ def test_a_switch_from_a_gait_to_itself_changes_no_bit(policies):
     for motion in staggering(3, 30):
         switched.switch(np.arange(3), "pace", motion)
         np.testing.assert_array_equal(switched.act(motion, command), plain.act(motion, command))
-        plain.see(motion)
-        switched.see(motion)
+        plain.see(motion, command)
+        switched.see(motion, command)
         switched.switch(np.array([1]), "pace", motion)
         np.testing.assert_array_equal(switched.machine_state, plain.machine_state)
         np.testing.assert_array_equal(switched.steps_in_state, plain.steps_in_state)
@@ -220,7 +223,7 @@ def test_after_a_switch_the_machine_is_in_the_state_that_fits_the_contacts(polic
     motion = motion_of([*FITTING, "FL BR"])
     driver = Driver(policies, len(FITTING) + 1, start=other)
     for _ in range(3):
-        driver.see(motion_of(["FL FR BL BR"] * (len(FITTING) + 1)))
+        driver.see(motion_of(["FL FR BL BR"] * (len(FITTING) + 1)), driver.own_command())
     driver.switch(np.arange(len(FITTING)), gait, motion)
     expected = [row[GAITS.index(gait)] for row in FITTING.values()]
     assert driver.machine_state.tolist() == [*expected, 0]
@@ -231,7 +234,11 @@ def test_after_a_switch_the_machine_is_in_the_state_that_fits_the_contacts(polic
 def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_action(policies):
     driver = Driver(policies, 2, start="trot")
     motion = motion_of(["FR BL", "BL BR"])
-    command = Command(forward_speed=np.array([1.2, 0.5]), yaw_rate=np.array([0.2, -0.1]))
+    command = Command(
+        forward_speed=np.array([1.2, 0.5]),
+        yaw_rate=np.array([0.2, -0.1]),
+        stride_frequency=np.array([2.0, 2.4]),
+    )
     first = driver.act(motion, command)
     driver.see(motion, command)
     driver.switch(np.array([1]), "bound", motion)
@@ -248,12 +255,60 @@ def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_act
     np.testing.assert_allclose(driver.act(motion, command)[1:], expected, atol=1e-6)
 
 
+def with_dwell(machine, dwell, name):
+    """The same two-state machine at another dwell [control steps], by another name."""
+    tables = machine.to_dict() | {"name": name, "dwell": dwell, "dwell_range": [10, 40]}
+    for way in tables["transition"]:
+        way["dwell"] = dwell
+    return RewardMachine.from_dict(tables)
+
+
+@pytest.fixture(scope="module")
+def paced(tmp_path_factory):
+    """Policies at home at different commands: 1.1 m/s and 100 / (2 · 20) Hz, 0.6 and 2 · 25."""
+    folder = tmp_path_factory.mktemp("paced")
+    return {
+        "quick": exported(folder, with_dwell(gaits.load("trot"), 20, "quick"), speed=1.1),
+        "slow": exported(folder, with_dwell(gaits.load("bound"), 25, "slow"), speed=0.6),
+    }
+
+
+def test_after_a_shift_a_robots_own_command_is_that_of_its_new_gait(paced):
+    driver = Driver(paced, 3, start="quick")
+    driver.switch(np.array([1]), "slow", motion_of(["FL BR"] * 3))
+    own = driver.own_command()
+    np.testing.assert_allclose(own.forward_speed, [1.1, 0.6, 1.1])
+    np.testing.assert_allclose(own.stride_frequency, [2.5, 2.0, 2.5])
+    assert not own.yaw_rate.any()
+    driver.switch(np.array([0, 1]), "quick", motion_of(["FL BR"] * 3))
+    np.testing.assert_allclose(driver.own_command().forward_speed, 1.1)
+
+
+def test_a_commanded_stride_frequency_holds_each_robots_machine_back_for_its_dwell(paced):
+    # Strides of 50 and 33.3 steps: dwells of 25 and of 17 (34 steps) for all, whatever the gait;
+    # strides of 10 and 200 steps end at the ranges, 10 and 40.
+    driver = Driver(paced, 4, start="quick")
+    driver.switch(np.array([1, 3]), "slow", motion_of(["FL BR", "FL FR"] * 2))
+    command = Command(
+        forward_speed=np.full(4, 1.0),
+        yaw_rate=np.zeros(4),
+        stride_frequency=np.array([2.0, 3.0, 10.0, 0.5]),
+    )
+    changed_at = {}
+    for step in range(1, 60):
+        driver.see(motion_of(["FR BL", "BL BR"] * 2), command)
+        for robot in np.flatnonzero(driver.machine_state == 1):
+            changed_at.setdefault(int(robot), step)
+    assert changed_at == {0: 25, 1: 17, 2: 10, 3: 40}
+
+
 def test_machines_go_on_as_the_feet_do(policies):
     driver = Driver(policies, 2, start="trot")
     dwell = gaits.load("trot").dwell
     # Robot 0 stands on its first diagonal for a dwell and then on the other; robot 1 stays.
     for step in range(dwell + 5):
-        driver.see(motion_of(["FL BR" if step < dwell + 2 else "FR BL", "FL BR"]))
+        motion = motion_of(["FL BR" if step < dwell + 2 else "FR BL", "FL BR"])
+        driver.see(motion, driver.own_command())
     assert driver.machine_state.tolist() == [1, 0]
     assert driver.steps_in_state.tolist() == [2, dwell + 5]
 
@@ -314,7 +369,7 @@ def walk_the_timeline(policies):
     switcher = Autonomous(CONDITION, 2, flat="trot", rough="bound")
     for step, row in enumerate(TIMELINE):
         motion = motion_of(["FL FR BL BR"] * 2, np.array([row[0], row[4]]))
-        driver.see(motion, command)
+        driver.see(motion, driver.own_command())
         decision = switcher.step((step + 1) / 100, motion, driver)
         yield row, driver, decision
 

@@ -14,6 +14,7 @@ from gaitshift.terrain import (
     KINDS,
     Section,
     Terrain,
+    bank,
     flat,
     from_spec,
     pebbles,
@@ -375,6 +376,30 @@ def test_slope_rises_by_its_tangent(degrees):
     np.testing.assert_allclose(terrain.height_at(xy), rise, atol=1e-12)
 
 
+@pytest.mark.parametrize("degrees", [12.0, -12.0])
+@pytest.mark.parametrize("towards", [0.0, 30.0, 90.0, 180.0, 250.0])
+def test_slope_towards_a_direction_rises_that_way_and_is_level_across_it(degrees, towards):
+    terrain = slope(degrees, towards=towards, length=6.0, width=4.0)
+    rise = math.tan(math.radians(degrees))
+    c, s = math.cos(math.radians(towards)), math.sin(math.radians(towards))
+    middle = np.array([[3.0, 0.0]])
+    ahead, across = (0.7 * np.array([way]) for way in ((c, s), (-s, c)))
+    here, there, aside = (terrain.height_at(middle + by) for by in (0 * ahead, ahead, across))
+    assert there - here == pytest.approx(0.7 * rise)
+    assert aside - here == pytest.approx(0.0, abs=1e-12)
+    assert terrain.height_at(np.zeros((1, 2))) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_bank_rises_to_the_left_of_who_walks_along_it():
+    terrain = bank(10.0, length=5.0, width=4.0)
+    xy = points_over(terrain)
+    rise = xy[:, 1] * math.tan(math.radians(10.0))
+    np.testing.assert_allclose(terrain.height_at(xy), rise, atol=1e-12)
+    assert terrain.name == "bank:10"
+    assert terrain.sections == (Section(name="bank:10", x0=0.0, x1=5.0),)
+    np.testing.assert_array_equal(bank(-10.0, length=5.0, width=4.0).height, -terrain.height)
+
+
 def test_step_goes_up_once_in_the_middle_within_one_cell():
     terrain = step(0.05, length=4.0, width=2.0)
     middle = np.array([[1.974, 0.5], [2.001, 0.5], [0.0, -1.0], [4.0, 1.0]])
@@ -432,6 +457,7 @@ def test_one_pebble_is_a_round_bump_of_its_diameter(seed):
         (lambda size: perlin(0.1, seed=0, octaves=0, **size), "octaves must be 1 to 8, got 0"),
         (lambda size: perlin(0.1, seed=0, wavelength=0.3, **size), "cell must be at most 0.0375"),
         (lambda size: slope(46.0, **size), "angle must be -45 to 45 degrees"),
+        (lambda size: bank(-45.1, **size), "angle must be -45 to 45 degrees"),
         (lambda size: stairs(-0.1, **size), "rise must be"),
         (lambda size: stairs(0.1, landing=1.5, **size), "length of 4.5 m or more, got 4"),
         (lambda size: stairs(0.1, run=0.1, cell=0.06, **size), "half a tread"),
@@ -554,6 +580,7 @@ SPECS = {
     "perlin:0.10": perlin(0.10, seed=9, **SIZES),
     "slope:15": slope(15.0, **SIZES),
     "slope:-1e1": slope(-10.0, **SIZES),
+    "bank:7": bank(7.0, **SIZES),
     "stairs:0.10": stairs(0.10, **SIZES),
     "step:0.05": step(0.05, **SIZES),
     " pebbles : 0.03 ": pebbles(0.03, seed=9, **SIZES),

@@ -17,7 +17,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.reward import RewardConfig
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
-from gaitshift.training.ground import draw_ground, stage_at
+from gaitshift.training.ground import draw_grounds, stage_at
 from gaitshift.training.learner import Learner
 from gaitshift.training.recipe import PRESETS, PpoConfig, Recipe, Stage
 from gaitshift.training.run import Run
@@ -25,16 +25,26 @@ from gaitshift.world import PushConfig
 
 TROT = gaits.load("trot")
 TINY = Recipe(
-    env=EnvConfig(episode_steps=30, heading_interval=11),
+    env=EnvConfig(episode_steps=30, command_interval=11),
     ppo=PpoConfig(hidden=(16, 8), epochs=2, mini_batches=2),
     stages=(
         Stage(name="flat", iterations=3, push=50.0),
-        Stage(name="rough", iterations=3, amplitude=0.1, redraw_every=2, push=100.0),
+        Stage(
+            name="rough",
+            iterations=3,
+            amplitude=0.1,
+            slope=8.0,
+            rise=0.04,
+            redraw_every=2,
+            push=100.0,
+        ),
     ),
     robots=4,
     steps=8,
-    swing_from=1,
-    swing_until=4,
+    strict_from=1,
+    strict_until=4,
+    command_from=0,
+    command_until=5,
     checkpoint_every=2,
     threads=1,
 )
@@ -120,7 +130,8 @@ def test_the_paper_preset_has_the_papers_figures():
     assert recipe.env.reward == RewardConfig.paper()
     assert recipe.env.forward_speed == 1.2
     assert recipe.env.gains == "paper"
-    assert recipe.swing_scale(0) == recipe.swing_scale(499) == 0.0
+    assert recipe.strictness(0) == recipe.strictness(499) == 0.0
+    assert recipe.env.command_share == recipe.env.heading_range == 0.0
 
 
 @pytest.mark.parametrize(
@@ -129,8 +140,10 @@ def test_the_paper_preset_has_the_papers_figures():
         {"robots": 0},
         {"robots": 65537},
         {"steps": 0},
-        {"swing_from": 4, "swing_until": 4},
-        {"swing_from": -1},
+        {"strict_from": 4, "strict_until": 4},
+        {"strict_from": -1},
+        {"command_from": 5, "command_until": 5},
+        {"command_from": -1},
         {"stages": ()},
         {"stages": (Stage(name="flat", iterations=0),)},
         {"stages": (Stage(name="flat", iterations=5), Stage(name="rough", iterations=-1))},
@@ -170,11 +183,17 @@ def test_no_iterations_are_too_few():
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])
-def test_the_swing_height_grows_in_a_straight_line_up_to_its_share(share):
-    recipe = replace(TINY, swing_from=10, swing_until=30, swing_share=share)
+def test_strictness_grows_in_a_straight_line_up_to_its_share(share):
+    recipe = replace(TINY, strict_from=10, strict_until=30, strict_share=share)
     table = {0: 0.0, 10: 0.0, 15: 0.25, 20: 0.5, 30: 1.0, 31: 1.0, 1000: 1.0}
     for iteration, grown in table.items():
-        assert recipe.swing_scale(iteration) == share * grown
+        assert recipe.strictness(iteration) == share * grown
+
+
+def test_commands_spread_in_a_straight_line_and_go_by_no_other_schedule():
+    recipe = replace(TINY, command_from=8, command_until=16, strict_from=100, strict_until=101)
+    table = {0: 0.0, 8: 0.0, 9: 0.125, 12: 0.5, 16: 1.0, 17: 1.0, 1000: 1.0}
+    assert {i: recipe.command_scale(i) for i in table} == table
 
 
 # Grounds ----------------------------------------------------------------------------------------
@@ -188,30 +207,88 @@ def test_each_iteration_has_its_stage_and_its_number_within_it():
     assert (stage.name, within) == ("c", 8), "beyond the end the last stage goes on"
 
 
-def test_the_same_numbers_give_the_same_ground_and_others_another():
-    stage = Stage(name="rough", iterations=40, amplitude=0.1)
+ROUGH = Stage(name="rough", iterations=50, amplitude=0.15, slope=12.0, rise=0.06)
 
+
+def measures(ground):
+    """Largest |height|, steepest gradient [degrees] and highest edge [m] of a ground."""
+    along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
+    # On a plane the gradient is the same all over; on stairs it is an edge over a cell.
+    gradient = np.degrees(np.arctan(np.hypot(along_x, along_y).max()))
+    edge = np.abs(np.diff(ground.height, axis=1)).max()
+    return np.abs(ground.height).max(), gradient, edge
+
+
+def sorts(grounds):
+    """Names of the kinds, told by the ground itself: a plane, steps along x, or noise."""
+    told = []
+    for ground in grounds:
+        bent = np.abs(np.diff(ground.height, n=2, axis=1)).max() > 1e-9
+        same_across = np.ptp(ground.height, axis=0).max() == 0
+        told.append("noise" if bent and not same_across else "stairs" if bent else "plane")
+    return told
+
+
+def test_the_same_numbers_give_the_same_grounds_and_others_others():
     def drawn(within, seed):
-        return draw_ground(stage, within, seed).height
+        return [ground.height.tobytes() for ground in draw_grounds(ROUGH, within, seed)]
 
-    np.testing.assert_array_equal(drawn(5, 1), drawn(5, 1))
-    assert not np.array_equal(drawn(5, 1), drawn(10, 1))
-    assert not np.array_equal(drawn(5, 1), drawn(5, 2))
+    assert drawn(5, 1) == drawn(5, 1)
+    for other in (drawn(10, 1), drawn(5, 2)):
+        assert all(one != another for one, another in zip(drawn(5, 1), other, strict=True))
+    assert len(set(drawn(5, 1))) == 6, "and no two robots' fields are alike"
 
 
-@pytest.mark.parametrize("amplitude", [0.005, 0.15])
-def test_no_ground_is_higher_than_its_stage_says_and_late_ones_come_near_it(amplitude):
-    stage = Stage(name="rough", iterations=50, amplitude=amplitude)
-    highest = np.array(
-        [np.abs(draw_ground(stage, within, 0).height).max() for within in range(0, 50, 4)]
+def test_half_of_the_fields_are_noise_and_the_others_slopes_and_stairs():
+    for within in (0, 20, 45):
+        grounds = draw_grounds(ROUGH, within, 3)
+        assert sorts(grounds) == ["noise"] * 3 + ["plane"] * 2 + ["stairs"]
+        assert len({ground.extent for ground in grounds}) == 1, "robots share one rectangle"
+
+
+def test_slopes_rise_in_any_direction():
+    angles = []
+    for within in range(0, 50, 2):
+        for ground in draw_grounds(ROUGH, within, 0)[3:5]:
+            along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
+            angles.append(np.arctan2(along_y.mean(), along_x.mean()))
+    quarters = np.bincount(np.floor(np.array(angles) / (np.pi / 2)).astype(int) + 2, minlength=4)
+    assert quarters.min() >= 5, "of 50 slopes"
+
+
+def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
+    found = np.array(
+        [
+            [measures(ground) for ground in draw_grounds(ROUGH, within, 0)]
+            for within in range(0, 50, 2)
+        ]
     )
-    assert highest.max() <= amplitude * (1 + 1e-9)
-    assert highest[7:].max() > 0.8 * amplitude
-    assert highest[:2].max() < highest[7:].max()
+    limits = {"noise": (slice(0, 3), 0, 0.15), "plane": (slice(3, 5), 1, 12.0)}
+    limits["stairs"] = (slice(5, 6), 2, 0.06)
+    for name, (fields_, measure, limit) in limits.items():
+        most = found[:, fields_, measure].max(axis=1)
+        assert most.max() <= limit * (1 + 1e-9), name
+        assert most[13:].max() > 0.8 * limit, name
+        # The first fields reach 0.3 of it, and 0.3 + 0.7 · 4 / 25 after four iterations.
+        assert most[:3].max() <= 0.412 * limit * (1 + 1e-9), name
 
 
-def test_a_stage_without_amplitude_is_level():
-    assert draw_ground(Stage(name="flat", iterations=5), 3, 0).is_flat
+@pytest.mark.parametrize(
+    ("measure", "rough"),
+    [("amplitude", [0, 1, 2]), ("slope", [3, 4]), ("rise", [5])],
+)
+def test_a_stage_of_one_kind_leaves_the_fields_of_the_others_level(measure, rough):
+    stage = Stage(name="one", iterations=10, **{measure: 0.1})
+    assert stage.is_rough
+    grounds = draw_grounds(stage, 9, 0)
+    assert [i for i, ground in enumerate(grounds) if not ground.is_flat] == rough
+
+
+def test_a_stage_without_measures_is_level():
+    stage = Stage(name="flat", iterations=5)
+    assert not stage.is_rough
+    (ground,) = draw_grounds(stage, 3, 0)
+    assert ground.is_flat
 
 
 # A run and its folder ---------------------------------------------------------------------------
@@ -245,17 +322,23 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
 def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
     run, _ = whole
     world = run.learner.env.world
-    np.testing.assert_array_equal(
-        world.terrains[0].height, draw_ground(TINY.stages[1], 2, run.seed).height
-    )
+    drawn = draw_grounds(TINY.stages[1], 2, run.seed)[: TINY.robots]
+    for ground, expected in zip(world.terrains, drawn, strict=True):
+        np.testing.assert_array_equal(ground.height, expected.height)
     assert run.learner.env.config.push.force == 100.0
-    assert run.learner.env.swing_scale == 1.0
+    assert run.learner.env.strictness == run.learner.env.command_scale == 1.0
 
 
 def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(whole):
     run, _ = whole
     loaded = policy.load(run.folder / "policy.onnx")
     assert loaded.gait == "trot"
+    info, trot = loaded.info, gaits.load("trot")
+    assert (info.forward_speed, info.speed_range) == (trot.speed, list(trot.speed_range))
+    # Two states; control steps of 0.01 s.
+    assert info.stride_frequency == pytest.approx(50 / trot.dwell)
+    slow, fast = trot.dwell_range[::-1]
+    assert info.stride_frequency_range == pytest.approx([50 / slow, 50 / fast])
     training = loaded.info.training
     assert (training["seed"], training["iterations"], training["steps"]) == (7, 6, 192)
     assert training["command"] == "gaitshift train trot"
@@ -691,8 +774,10 @@ def test_thirty_iterations_are_enough_to_find_the_cycle_of_a_gait(tmp_path):
         stages=(Stage(name="flat", iterations=30),),
         robots=64,
         steps=24,
-        swing_from=1000,
-        swing_until=1001,
+        strict_from=1000,
+        strict_until=1001,
+        command_from=1000,
+        command_until=1001,
         threads=1,
     )
     reported = []

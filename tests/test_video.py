@@ -59,7 +59,7 @@ def slide(steps: int = 40, ground: str = "perlin:0.05") -> Log:
         machine_state=np.zeros((steps, 1), dtype=int),
         stance_shown=np.ones((steps, 1), dtype=bool),
         fallen=np.zeros((steps, 1), dtype=bool),
-        command=np.zeros((steps, 1, 2)),
+        command=np.zeros((steps, 1, 3)),
         gaits=("pace",),
         robot="anymal_b",
         terrain=ground,

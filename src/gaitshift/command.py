@@ -1,4 +1,4 @@
-"""What a robot is asked to do: speed, yaw rate, stride frequency; and the loop that keeps a line."""
+"""What a robot is asked to do: speed, yaw rate, stride frequency; and the loop to keep a line."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,6 @@ anything a walking leg asks for."""
 
 PAPER_SPEED = 1.2
 """Commanded forward speed v_d [m/s] (paper III-C)."""
-
 
 MOST_SPEED = 3.0
 """Greatest speed that may be asked for [m/s]; ours: a joint at its limit swings a leg this fast."""

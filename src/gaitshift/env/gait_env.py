@@ -183,20 +183,24 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._update_command()
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
-        terrain = self.world.terrains[0]
-        if terrain.is_flat:
+        if self._is_level:
             return np.zeros((count, 2))
-        x0, x1, y0, y1 = terrain.extent
+        x0, x1, y0, y1 = self.world.terrains[0].extent
         inset = 2 * self.config.terrain_margin
         low = (min(x0 + inset, (x0 + x1) / 2), min(y0 + inset, (y0 + y1) / 2))
         high = (max(x1 - inset, (x0 + x1) / 2), max(y1 - inset, (y0 + y1) / 2))
         return self._rng.uniform(low, high, (count, 2))
 
     def _left_terrain(self, motion: Motion) -> Bool[np.ndarray, " N"]:
-        terrain = self.world.terrains[0]
-        if terrain.is_flat:
+        if self._is_level:
             return np.zeros(self.num_envs, dtype=bool)
-        return ~terrain.contains(motion.base_position_w[:, :2], self.config.terrain_margin)
+        inside = self.world.terrains[0].contains
+        return ~inside(motion.base_position_w[:, :2], self.config.terrain_margin)
+
+    @property
+    def _is_level(self) -> bool:
+        """Whether no robot's ground has a border: level ground goes on for ever."""
+        return all(terrain.is_flat for terrain in self.world.terrains)
 
     def _update_command(self) -> None:
         """Draws commands that are due anew, and turns every robot towards its heading."""

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift.command import PAPER_SPEED
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.log import Log
@@ -91,7 +90,8 @@ def run_demo(
     switcher = _switcher(config)
     grounds = [_ground(config, config.seed + i) for i in range(n)]
     finish = _finish(config, grounds[0])
-    run = RolloutConfig(seconds=_seconds(config, finish))
+    slowest = min(policies[gait].info.forward_speed for gait in config.used)
+    run = RolloutConfig(seconds=_seconds(config, finish, slowest))
     world = World(driver.robot, grounds, n, gains=driver.gains)
     start = np.tile([START, 0.0], (n, 1))
     log = rollout(
@@ -155,8 +155,8 @@ def _finish(config: DemoConfig, ground: Terrain) -> float:
     return np.inf if config.gaits else ground.extent[1] - RUN_OUT
 
 
-def _seconds(config: DemoConfig, finish: float) -> float:
-    """Long enough for a robot at two thirds of the commanded speed."""
+def _seconds(config: DemoConfig, finish: float, speed: float) -> float:
+    """Long enough for a robot at two thirds of the commanded speed [m/s]."""
     if config.gaits:
         return config.shift_times[-1] + config.every
-    return 1.5 * (finish - START) / PAPER_SPEED
+    return 1.5 * (finish - START) / speed

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gaitshift.command import CONTROL_PERIOD, MOST_SPEED
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.gait_analysis import measure, robot_mass
@@ -52,6 +53,11 @@ class EvaluationConfig:
             raise GaitshiftError(f"{self.seconds} seconds: more than 0, up to 3600 would be right")
         if self.seed < 0:
             raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+        if self.speed is not None and not 0 <= self.speed <= MOST_SPEED:
+            raise GaitshiftError(f"{self.speed} m/s: 0 to {MOST_SPEED:g} m/s would be right")
+        frequency, most = self.stride_frequency, 1 / CONTROL_PERIOD
+        if frequency is not None and not 0 < frequency <= most:
+            raise GaitshiftError(f"{frequency} Hz: more than 0, up to {most:g} Hz would be right")
 
 
 def evaluate(

@@ -6,6 +6,11 @@ is checked when it is read, never run. It holds
 - `name`, `title`, `description`: short name, name for people, what the gait is;
 - `dwell` [control steps] and `swing_height` [m, 0 if left out]: what a transition asks for that
   names no other;
+- `dwell_range` [control steps]: least and greatest dwell that may be commanded, by way of the
+  stride frequency; transitions that name their own keep their proportion. `dwell` alone if left
+  out;
+- `speed` [m/s, the paper's 1.2 if left out] and `speed_range` [m/s, `speed` alone if left out]:
+  where the gait is at home, and what may be commanded;
 - `ideal_phase`: touchdown of each foot [fraction of the stride, 0 to below 1];
 - `[[state]]`, the first one initial: `name`, and `stance`, the feet down; or `name` and
   `accepting = true` for a state in which the run ends;

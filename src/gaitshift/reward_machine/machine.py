@@ -276,7 +276,7 @@ class RewardMachine:
         check_swing_height(swing_height)
         speed = table.number("speed", default=PAPER_SPEED)
         dwell_range = table.pair("dwell_range", default=(dwell, dwell))
-        if not all(end == int(end) for end in dwell_range):
+        if not all(end.is_integer() for end in dwell_range):
             raise GaitshiftError("dwell_range must be two whole numbers of control steps")
         with located("ideal_phase"):
             phases = Table(table.get("ideal_phase"), keys=LEGS)

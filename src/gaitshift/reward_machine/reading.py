@@ -87,8 +87,11 @@ class Table:
         ends = self._list(key, "two numbers, such as [0.4, 1.6]") if self.has(key) else [*default]
         if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
             raise _wrong(key, "two numbers, such as [0.4, 1.6]", ends)
-        low, high = cast(list[float], ends)
-        return float(low), float(high)
+        try:
+            low, high = (float(end) for end in cast(list[float], ends))
+        except OverflowError:
+            raise _wrong(key, "two numbers of a usual size", ends) from None
+        return low, high
 
     def feet(self, key: str) -> Feet:
         """Return a list of feet, each named once."""

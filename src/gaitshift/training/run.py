@@ -149,10 +149,10 @@ class Run:
         if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
             env.set_terrain(draw_grounds(stage, within, self.seed))
             env.push_at_most(stage.push)
-        if self._is_checkpoint():
-            self.learner.start_episodes(_seed_at(self.seed, self.iteration))
         env.strictness = self.recipe.strictness(self.iteration)
         env.command_scale = self.recipe.command_scale(self.iteration)
+        if self._is_checkpoint():
+            self.learner.start_episodes(_seed_at(self.seed, self.iteration))
         seen = self.learner.iterate()
         self.iteration += 1
         self._wall += time.perf_counter() - start
