@@ -22,7 +22,7 @@ ADDITIONS = (
     "stance_pattern",
     "slip",
     "power",
-    "touchdown",
+    "bounce",
     "action_rate",
 )
 """The terms that are ours; every other one is Table I's."""
@@ -49,7 +49,7 @@ class RewardConfig:
     """Times ‖q - q_init‖² (Table I)."""
     joint_velocity: float = -0.01
     """Times ‖q̇‖² [s²] (Table I)."""
-    speed_tracking: float = 5.0
+    speed_tracking: float = 8.0
     """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: Table I's bell is so wide that a walk at 1 m/s
     in place of 1.2 m/s loses 4 % of it."""
     stance_feet: float = 8.0
@@ -61,9 +61,9 @@ class RewardConfig:
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
     power: float = -0.015
     """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
-    touchdown: float = -30.0
-    """Times the feet that come down in this step, and the environment's strictness; ours: a clean
-    cycle has one touchdown a foot, and every bounce on top of it costs as much again."""
+    bounce: float = -30.0
+    """Times the feet that touch again within `env.BOUNCE` of having left the ground, and the
+    environment's strictness; ours: a clean cycle has one touchdown a foot."""
     action_rate: float = -0.02
     """Times ‖a - a_last‖²; ours: smooth targets."""
     bonus: float = 200.0
@@ -91,7 +91,7 @@ def walk_reward(
     *,
     stance: Float[np.ndarray, " 12"],
     agreement: Float[np.ndarray, " N"],
-    touchdowns: Float[np.ndarray, " N"],
+    bounces: Float[np.ndarray, " N"],
     action_change: Float[np.ndarray, "N 12"],
 ) -> RewardTerms:
     """R_walk, term by term (Table I and the additions).
@@ -102,7 +102,7 @@ def walk_reward(
         command: what was asked for.
         stance: q_init [rad].
         agreement: share of the feet that are as the stance of the machine's state has them.
-        touchdowns: number of feet that came down in this step, times the present strictness.
+        bounces: number of feet that bounced in this step, times the present strictness.
         action_change: action minus the action before it.
     """
     velocity = motion.base_linear_velocity_b
@@ -123,7 +123,7 @@ def walk_reward(
         "stance_pattern": config.stance_pattern * (agreement == 1.0),
         "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
         "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
-        "touchdown": config.touchdown * touchdowns,
+        "bounce": config.bounce * bounces,
         "action_rate": config.action_rate * _squares(action_change),
     }
 

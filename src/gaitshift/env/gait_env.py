@@ -20,6 +20,10 @@ from gaitshift.robot import ANYMAL_B, Robot
 from gaitshift.terrain import Terrain
 from gaitshift.world import Pusher, World
 
+BOUNCE = 8
+"""A foot that touches after fewer control steps in the air than this has bounced (0.08 s); ours: the
+shortest swing of any gait at its highest frequency, of the hind feet in three-one, is 9 steps."""
+
 Observations = Float32[np.ndarray, "N D"]
 
 
@@ -52,7 +56,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
         self.strictness = 1.0
         """How much of what only a clean gait can give is asked for now, 0 to 1: factor on the swing
-        heights of the machine's guards and on the price of a touchdown."""
+        heights of the machine's guards and on the price of a bounce."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
@@ -86,7 +90,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """One control step of 10 ms; `actions` scale to joint targets about the stance."""
         action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         self.world.push(self._pusher.step())
-        stood = self.world.motion.contact
         motion = self.world.step(self._stance + self.robot.action_scale * action)
         self._state, changed, bonus = self.machine.step(
             self._state,
@@ -104,7 +107,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             self._command,
             stance=self._stance,
             agreement=agreement,
-            touchdowns=self.strictness * (motion.contact & ~stood).sum(axis=1),
+            bounces=self.strictness * self._bounces(motion),
             action_change=action - self._last_action,
         )
         reward = with_bonus(self.config.reward, np.sum(list(terms.values()), axis=0), bonus)
@@ -146,6 +149,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
+        self._air_steps: Int[np.ndarray, "N 4"] = np.full((n, 4), BOUNCE)
         self._line: Float[np.ndarray, " N"] = np.zeros(n)
         self._heading: Float[np.ndarray, " N"] = np.zeros(n)
         self._command = self._own_command(n)
@@ -178,9 +182,17 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._steps_in_state[ids] = 0
         self._age[ids] = 0
         self._last_action[ids] = 0.0
+        self._air_steps[ids] = BOUNCE
         self._line[ids] = self._heading[ids] = yaw
         self._draw_commands(ids)
         self._update_command()
+
+    def _bounces(self, motion: Motion) -> Int[np.ndarray, " N"]:
+        """How many feet of each robot touch again shortly after they left the ground."""
+        down = motion.contact
+        bounced = down & (self._air_steps > 0) & (self._air_steps < BOUNCE)
+        self._air_steps = np.where(down, 0, self._air_steps + 1)
+        return bounced.sum(axis=1)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:
