@@ -21,8 +21,10 @@ from gaitshift.terrain import Terrain
 from gaitshift.world import Pusher, World
 
 BOUNCE = 8
-"""A foot that touches after fewer control steps in the air than this has bounced (0.08 s); ours: the
-shortest swing of any gait at its highest frequency, of the hind feet in three-one, is 9 steps."""
+"""A foot that touches after fewer control steps in the air than this has bounced (0.08 s).
+
+Ours: the shortest swing of any gait, of three-one's hind feet at the highest frequency, is 9 steps.
+"""
 
 Observations = Float32[np.ndarray, "N D"]
 
