@@ -9,7 +9,7 @@ import torch
 
 from gaitshift import gaits, policy
 from gaitshift.cli import main
-from gaitshift.env import GaitEnv
+from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.evaluation import SIZES, run_trials
 from gaitshift.evaluation import trials as trials_module
 from gaitshift.evaluation.trials import TRIALS, Row, Size, lateral_errors
@@ -26,7 +26,9 @@ TINY = Size(pushed=6, episodes=3, seconds=0.3, distance=0.2)
 def walk_file(tmp_path_factory):
     """An untrained policy that holds the stance: its actions are all but zero."""
     torch.manual_seed(0)
-    env = GaitEnv(gaits.load("walk"), flat(10.0, 10.0), 2, threads=1)
+    env = GaitEnv(
+        gaits.load("walk"), flat(10.0, 10.0), 2, config=EnvConfig(command_share=0.0), threads=1
+    )
     actor = Learner(
         env, Recipe(env=env.config, ppo=PpoConfig(hidden=(8, 8)), robots=2, steps=2)
     ).ppo.actor
