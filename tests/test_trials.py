@@ -40,11 +40,18 @@ def walk_file(tmp_path_factory):
     return path
 
 
-def test_trials_give_a_row_for_every_ground_and_every_limit(walk_file):
+@pytest.fixture(scope="module")
+def tried(walk_file):
+    """What trials give, and how their progress was told."""
     done = []
-    rows, figures, log = run_trials(
+    result = run_trials(
         policy.load(walk_file), TINY, report=lambda now, total: done.append((now, total))
     )
+    return result, done
+
+
+def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
+    (rows, figures, log), done = tried
     titles = [row.trial for row in rows]
     assert len(set(titles)) == len(rows) == len(TRIALS) + 7
     assert [title for title in titles if "perlin:0.20" in title]
@@ -123,8 +130,8 @@ def test_evaluate_prints_one_object_and_draws(walk_file, tmp_path, capsys):
     assert picture.stat().st_size > 10_000
 
 
-def test_trials_print_one_object(walk_file, capsys, monkeypatch):
-    monkeypatch.setitem(SIZES, "quick", TINY)
+def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys, monkeypatch):
+    monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_: tried[0])
     main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
     said = json.loads(capsys.readouterr().out)
     assert len(said["trials"]) == len(TRIALS) + 7
