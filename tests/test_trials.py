@@ -9,7 +9,7 @@ import torch
 
 from gaitshift import gaits, policy
 from gaitshift.cli import main
-from gaitshift.env import GaitEnv
+from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.evaluation import SIZES, run_trials
 from gaitshift.evaluation import trials as trials_module
 from gaitshift.evaluation.trials import TRIALS, Row, Size, lateral_errors
@@ -26,7 +26,9 @@ TINY = Size(pushed=6, episodes=3, seconds=0.3, distance=0.2)
 def walk_file(tmp_path_factory):
     """An untrained policy that holds the stance: its actions are all but zero."""
     torch.manual_seed(0)
-    env = GaitEnv(gaits.load("walk"), flat(10.0, 10.0), 2, threads=1)
+    env = GaitEnv(
+        gaits.load("walk"), flat(10.0, 10.0), 2, config=EnvConfig(command_share=0.0), threads=1
+    )
     actor = Learner(
         env, Recipe(env=env.config, ppo=PpoConfig(hidden=(8, 8)), robots=2, steps=2)
     ).ppo.actor
@@ -38,11 +40,18 @@ def walk_file(tmp_path_factory):
     return path
 
 
-def test_trials_give_a_row_for_every_ground_and_every_limit(walk_file):
+@pytest.fixture(scope="module")
+def tried(walk_file):
+    """What trials give, and how their progress was told."""
     done = []
-    rows, figures, log = run_trials(
+    result = run_trials(
         policy.load(walk_file), TINY, report=lambda now, total: done.append((now, total))
     )
+    return result, done
+
+
+def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
+    (rows, figures, log), done = tried
     titles = [row.trial for row in rows]
     assert len(set(titles)) == len(rows) == len(TRIALS) + 7
     assert [title for title in titles if "perlin:0.20" in title]
@@ -121,8 +130,8 @@ def test_evaluate_prints_one_object_and_draws(walk_file, tmp_path, capsys):
     assert picture.stat().st_size > 10_000
 
 
-def test_trials_print_one_object(walk_file, capsys, monkeypatch):
-    monkeypatch.setitem(SIZES, "quick", TINY)
+def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys, monkeypatch):
+    monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_: tried[0])
     main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
     said = json.loads(capsys.readouterr().out)
     assert len(said["trials"]) == len(TRIALS) + 7

@@ -22,12 +22,14 @@ class Sample:
 
     log: Log
     """The log from the end of the warm-up on."""
+    whole: Log
+    """The log with its warm-up: what happens at the first step shows against the one before."""
 
     @classmethod
     def of(cls, log: Log, warm_up: float = WARM_UP) -> "Sample":
         """The sample of a whole log; empty where the log is no longer than the warm-up [s]."""
         begin = int(np.searchsorted(log.time, warm_up, side="right"))
-        return cls(log=log.part(slice(begin, None)))
+        return cls(log=log.part(slice(begin, None)), whole=log)
 
     @property
     def period(self) -> float:
@@ -53,20 +55,23 @@ class Sample:
     @cached_property
     def onsets(self) -> Bool[np.ndarray, "L N 4"]:
         """Where a foot is down that was up in the step before: every contact, bounces too."""
-        return onsets(self.log.contact) & self.alive[..., None]
+        return self._late(onsets(self.whole.contact)) & self.alive[..., None]
 
     @cached_property
     def touchdowns(self) -> Bool[np.ndarray, "L N 4"]:
         """Where a foot ends a swing: onsets that are no bounce (`steps.steady`)."""
-        return onsets(steady(self.log.contact, self.period)) & self.alive[..., None]
+        steps = onsets(steady(self.whole.contact, self.period))
+        return self._late(steps) & self.alive[..., None]
 
     def entries(self, machines: Mapping[str, RewardMachine]) -> Bool[np.ndarray, "L N"]:
         """Where a machine comes back into its first state: a cycle is full."""
-        log = self.log
+        log = self.whole
         first = np.array([machines[gait].initial for gait in log.gaits])
         in_first = log.machine_state == first[log.gait]
         same_gait = log.gait[1:] == log.gait[:-1]
-        return _later(in_first[1:] & ~in_first[:-1] & same_gait, in_first) & self.alive
+        entry = np.zeros_like(in_first)
+        entry[1:] = in_first[1:] & ~in_first[:-1] & same_gait
+        return self._late(entry) & self.alive
 
     def gait(self) -> str:
         """The gait that was in force for most of the time."""
@@ -75,11 +80,6 @@ class Sample:
         )
         return self.log.gaits[int(counts.argmax())]
 
-
-def _later(
-    happened: Bool[np.ndarray, "M N"], like: Bool[np.ndarray, "L N"]
-) -> Bool[np.ndarray, "L N"]:
-    """What happened from each step to the next, at the later one; nothing at the first."""
-    result = np.zeros_like(like)
-    result[1:] = happened
-    return result
+    def _late(self, course: Bool[np.ndarray, "T *rest"]) -> Bool[np.ndarray, "L *rest"]:
+        """What of a course over the whole log falls into the sample."""
+        return course[len(self.whole.time) - len(self.log.time) :]
