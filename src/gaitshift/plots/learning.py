@@ -52,7 +52,7 @@ def reward_curves(rewards: Mapping[str, Courses], landmarks: Landmarks, path: Pa
     colours = gait_colours(rewards)
     with house_style():
         figure = Figure(figsize=_SIZE)
-        axes = figure.add_axes((0.10, 0.13, 0.87, 0.66))
+        axes = figure.add_axes((0.10, 0.13, 0.87, 0.65))
         low, high = landmarks.plateau
         axes.axhspan(low, high, color=QUIET, alpha=0.22, linewidth=0, gid="plateau")
         axes.axhline(0.0, color=QUIET, linewidth=0.8)
@@ -61,9 +61,11 @@ def reward_curves(rewards: Mapping[str, Courses], landmarks: Landmarks, path: Pa
         for gait, iteration in landmarks.zero_crossing.items():
             if gait in colours:
                 axes.plot(iteration, 0.0, "v", color=colours[gait], markersize=9, clip_on=False)
-        axes.plot(1, landmarks.start, "<", color=QUIET, markersize=9, clip_on=False)
-        axes.plot([], [], "v", color=QUIET, markersize=9, label="the paper's zero, start")
-        axes.fill_between([], [], [], color=QUIET, alpha=0.22, linewidth=0, label="its plateau")
+        axes.plot(
+            0, landmarks.start, ">", color=QUIET, markersize=9, clip_on=False, label="paper: start"
+        )
+        axes.plot([], [], "v", color=QUIET, markersize=9, label="paper: zero, by gait")
+        axes.fill_between([], [], [], color=QUIET, alpha=0.22, linewidth=0, label="paper: end")
         axes.set_xlim(0, max(len(course) for courses in rewards.values() for course in courses))
         axes.set_xlabel("iteration")
         few_ticks(axes)
@@ -71,9 +73,9 @@ def reward_curves(rewards: Mapping[str, Courses], landmarks: Landmarks, path: Pa
         figure.legend(
             loc="upper left",
             bbox_to_anchor=(0.085, 0.995),
-            ncols=5,
+            ncols=3,
             handlelength=1.2,
-            columnspacing=1.2,
+            columnspacing=2.0,
             handletextpad=0.5,
             borderpad=0.0,
             borderaxespad=0.4,
@@ -111,7 +113,8 @@ def comparison_curves(
         figure.supxlabel("iteration", size=13, color=INK)
         figure.supylabel("forward speed [m/s]", size=13, color=INK)
         page[0].set_ylim(-0.3, 2.3)
-        page[0].set_xlim(left=0)
+        longest = max(len(c) for panel in panels.values() for s in panel.values() for c in s)
+        page[0].set_xlim(0, longest)
         figure.tight_layout(pad=0.6)
         save(figure, path)
     return figure

@@ -58,7 +58,7 @@ def findings(results: Results) -> list[Finding]:
                 Finding(
                     name=group,
                     paper=paper,
-                    measured=f"{ABLATED.capitalize()}: {'; '.join(told)}.",
+                    measured=f"{ABLATED.capitalize()}. {'. '.join(told)}.",
                     verdict=judge(reference, others),
                 )
             )
@@ -99,7 +99,7 @@ def _order(gaits: dict[str, Seeds]) -> Finding:
     return Finding(
         name="order",
         paper="Trot is learned first, bound comes next, pace takes longest (IV-B).",
-        measured=f"The median run walks from: {', '.join(told)}.",
+        measured=f"The median run walks from iteration: {', '.join(told)}.",
         verdict=_grade(sum(in_order), len(in_order)),
     )
 
@@ -111,7 +111,7 @@ def _curves(gaits: dict[str, Seeds]) -> Finding:
         start = float(np.mean([c.reward[0] for c in seeds.courses if len(c)] or [np.nan]))
         late, crossing = seeds.late("reward"), seeds.cross_zero_at
         told.append(
-            f"{gait} starts at {start:.0f}, crosses zero at {_iteration(crossing)}"
+            f"{gait} starts at {start:.0f}, is positive from iteration {_iteration(crossing)}"
             f" (paper: {ZERO_CROSSING[gait]}) and ends at {_number(late, '.1f')}"
         )
         low, high = PLATEAU[0] - PLATEAU_WITHIN, PLATEAU[1] + PLATEAU_WITHIN
@@ -198,13 +198,15 @@ _COMPARISONS = {
 
 
 def _told(label: str, seeds: Seeds) -> str:
+    """How many walk, and how many are as fast in whatever gait, with the median first iterations."""
     text = (
-        f"{label}: {seeds.walking} of {len(seeds)} walk, the median run from "
-        f"{_iteration(seeds.walk_from)}; at the end {_number(seeds.late('speed'), '.2f')} m/s, "
+        f"**{label}** {seeds.walking} of {len(seeds)} walk (median from iteration "
+        f"{_iteration(seeds.walk_from)}), {seeds.moving} are as fast in whatever gait "
+        f"({_iteration(seeds.move_from)}); at the end {_number(seeds.late('speed'), '.2f')} m/s, "
         f"{_number(seeds.late('changes_per_s'), '.1f')} changes a second"
     )
     broken = sum(seeds.broken)
-    return f"{text}, {broken} broke down" if broken else text
+    return f"{text}; {broken} broke down" if broken else text
 
 
 def _grade(good: int, of: int) -> Verdict:
@@ -218,7 +220,7 @@ def _or_never(iteration: float | None) -> float:
 
 
 def _iteration(iteration: float | None) -> str:
-    return "never" if iteration is None else f"iteration {iteration:g}"
+    return "never" if iteration is None else f"{iteration:g}"
 
 
 def _number(value: float | None, form: str) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from statistics import fmean
 
@@ -32,8 +33,8 @@ class Judged:
     """Seed of its training."""
     walks_at: int | None
     """Iteration of its training from which it walked."""
-    figures: dict[str, float]
-    """`FIGURES` by name."""
+    figures: dict[str, float | None]
+    """`FIGURES` by name; None what cannot be told of a robot that fell at once."""
     log: Log
     """The walk itself."""
 
@@ -58,7 +59,7 @@ def middle(judged: list[Judged], gait: str) -> Judged | None:
     """The policy of a gait that shows its pattern neither most nor least."""
     ordered = sorted(
         (one for one in judged if one.gait == gait),
-        key=lambda one: one.figures["pattern_fraction"],
+        key=lambda one: one.figures["pattern_fraction"] or 0.0,
     )
     return ordered[len(ordered) // 2] if ordered else None
 
@@ -70,5 +71,6 @@ def _policies(results: Results) -> Iterator[tuple[str, int, int | None, str]]:
                 yield gait, job.seed, course.walks_at, job.name
 
 
-def _one(value: float | list[float]) -> float:
-    return fmean(value) if isinstance(value, list) else float(value)
+def _one(value: float | list[float]) -> float | None:
+    number = fmean(value) if isinstance(value, list) else float(value)
+    return number if isfinite(number) else None

@@ -122,7 +122,12 @@ def _gait_table(judged: list[Judged]) -> str:
     return _table(
         head,
         [
-            (one.gait, str(one.seed), _text(one.walks_at), *map(_text, one.figures.values()))
+            (
+                one.gait,
+                str(one.seed),
+                _text(one.walks_at, "never"),
+                *map(_text, one.figures.values()),
+            )
             for one in judged
         ],
     )
@@ -134,6 +139,7 @@ def _ablation_table(rows: list[tables.Row]) -> str:
         "label": "setting",
         "walking": "walking",
         "walk_from_iteration": "from iteration",
+        "as_fast": "as fast",
         "late_speed": "speed at the end [m/s]",
         "late_survival": "survival",
         "late_changes_per_s": "changes of state [1/s]",
@@ -141,7 +147,8 @@ def _ablation_table(rows: list[tables.Row]) -> str:
     }
     shown = [{**row, "walking": f"{row['walking']} of {row['seeds']}"} for row in rows]
     return _table(
-        tuple(columns.values()), [tuple(_text(row[key]) for key in columns) for row in shown]
+        tuple(columns.values()),
+        [tuple(_text(row[key], "never") for key in columns) for row in shown],
     )
 
 
@@ -150,9 +157,9 @@ def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _text(value: str | float | None) -> str:
+def _text(value: str | float | None, nothing: str = "–") -> str:
     if value is None:
-        return "never"
+        return nothing
     if isinstance(value, str):
         return value
     return f"{value:g}" if value == int(value) else f"{value:.2f}"

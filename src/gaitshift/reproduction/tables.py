@@ -27,7 +27,7 @@ def gait_rows(judged: list[Judged]) -> list[Row]:
             "gait": one.gait,
             "seed": one.seed,
             "walks_from_iteration": one.walks_at,
-            **{name: round(value, 4) for name, value in one.figures.items()},
+            **{name: _short(value) for name, value in one.figures.items()},
         }
         for one in judged
     ]
@@ -80,5 +80,9 @@ def _ablation_row(setting: Setting, seeds: Seeds) -> Row:
         "walk_from_iteration": seeds.walk_from,
         "as_fast": seeds.moving,
         "as_fast_from_iteration": seeds.move_from,
-        **{name: None if value is None else round(value, 4) for name, value in late.items()},
+        **{name: _short(value) for name, value in late.items()},
     }
+
+
+def _short(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)
