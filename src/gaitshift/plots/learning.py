@@ -70,16 +70,20 @@ def reward_curves(rewards: Mapping[str, Courses], landmarks: Landmarks, path: Pa
         axes.set_xlabel("iteration")
         few_ticks(axes)
         name_row(axes, "reward [per control step]; band: standard deviation over seeds")
-        figure.legend(
-            loc="upper left",
-            bbox_to_anchor=(0.085, 0.995),
-            ncols=3,
-            handlelength=1.2,
-            columnspacing=2.0,
-            handletextpad=0.5,
-            borderpad=0.0,
-            borderaxespad=0.4,
-        )
+        handles, labels = axes.get_legend_handles_labels()
+        for row, part in enumerate((slice(0, len(rewards)), slice(len(rewards), None))):
+            figure.legend(
+                handles[part],
+                labels[part],
+                loc="upper left",
+                bbox_to_anchor=(0.085, 0.995 - 0.06 * row),
+                ncols=3,
+                handlelength=1.2,
+                columnspacing=2.0,
+                handletextpad=0.5,
+                borderpad=0.0,
+                borderaxespad=0.4,
+            )
         save(figure, path)
     return figure
 

@@ -198,7 +198,7 @@ _COMPARISONS = {
 
 
 def _told(label: str, seeds: Seeds) -> str:
-    """How many walk, and how many are as fast in whatever gait, with the median first iterations."""
+    """How many walk, how many are as fast in whatever gait, and from when, by the median."""
     text = (
         f"**{label}** {seeds.walking} of {len(seeds)} walk (median from iteration "
         f"{_iteration(seeds.walk_from)}), {seeds.moving} are as fast in whatever gait "
