@@ -15,7 +15,7 @@ import pytest
 
 from gaitshift import gaits
 from gaitshift.cli import main
-from gaitshift.env import GaitEnv
+from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.observation import PAPER_SLICES
 from gaitshift.plots.learning import Landmarks, comparison_curves, reward_curves
@@ -124,7 +124,8 @@ def test_a_factor_on_penalties_beyond_0_to_1_is_refused(start):
 
 def test_the_factor_is_on_the_penalties_and_on_nothing_else():
     def terms(scale):
-        env = GaitEnv(gaits.load("trot"), flat(4.0, 4.0), 5, threads=1)
+        config = EnvConfig(command_share=0.0)
+        env = GaitEnv(gaits.load("trot"), flat(4.0, 4.0), 5, config=config, threads=1)
         env.reset(seed=3)
         env.penalty_scale = scale
         return env.step(np.random.default_rng(0).normal(size=(5, 12)))[4]["reward_terms"]
