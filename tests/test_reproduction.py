@@ -279,6 +279,13 @@ def test_an_ablation_is_judged_by_how_it_learned(setting, courses, broken, group
     assert verdicts(table)[group] == verdict
 
 
+def test_an_ablation_that_does_not_decide_gives_no_verdict():
+    table = like_the_paper() | {
+        ("lockout-20", "trot"): seeds("lockout-20", "trot", [course(300, walks=30)] * 3),
+    }
+    assert "lock-out" not in verdicts(table)
+
+
 def test_an_ablation_is_held_against_as_many_seeds_and_iterations():
     late = [course(walks=400)] * 3 + [course(walks=38)] * 2
     table = {

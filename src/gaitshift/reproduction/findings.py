@@ -1,6 +1,5 @@
 """What the paper says, what was measured, and whether it holds: a row a statement."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
@@ -47,11 +46,11 @@ def findings(results: Results) -> list[Finding]:
     reference = results.reference
     if reference is not None:
         ablations = dict(results.ablations())
-        for group, (paper, judge) in _COMPARISONS.items():
+        for group, (paper, deciding, judge) in _COMPARISONS.items():
             settings = [s for s in ABLATIONS if s.group == group and s.name in ablations]
-            others = [ablations[s.name] for s in settings]
-            if not others:
+            if deciding not in ablations:
                 continue
+            others = [ablations[s.name] for s in settings]
             labels = [AS_IN_THE_PAPER[group], *(s.label for s in settings)]
             told = [_told(*pair) for pair in zip(labels, [reference, *others], strict=True)]
             found.append(
@@ -59,7 +58,7 @@ def findings(results: Results) -> list[Finding]:
                     name=group,
                     paper=paper,
                     measured=f"{ABLATED.capitalize()}. {'. '.join(told)}.",
-                    verdict=judge(reference, others),
+                    verdict=judge(reference, ablations[deciding]),
                 )
             )
     return found
@@ -138,63 +137,69 @@ def _curves(gaits: dict[str, Seeds]) -> Finding:
     )
 
 
-def _works_as_printed(reference: Seeds, others: Sequence[Seeds]) -> Verdict:
-    return _grade(others[-1].walking, len(others[-1]))
+def _works_as_printed(reference: Seeds, other: Seeds) -> Verdict:
+    return _grade(other.walking, len(other))
 
 
-def _walks_without_lockout(reference: Seeds, others: Sequence[Seeds]) -> Verdict:
-    changes = others[0].late("changes_per_s")
+def _walks_without_lockout(reference: Seeds, other: Seeds) -> Verdict:
+    changes = other.late("changes_per_s")
     walks = changes is not None and changes <= MOST_CHANGES
-    return _grade(others[0].walking, len(others[0])) if walks else "does not hold"
+    return _grade(other.walking, len(other)) if walks else "does not hold"
 
 
-def _is_needed(reference: Seeds, others: Sequence[Seeds]) -> Verdict:
-    fewer = others[0].walking / len(others[0]) < reference.walking / len(reference)
-    later = _or_never(others[0].walk_from) > LATER * _or_never(reference.walk_from)
+def _is_needed(reference: Seeds, other: Seeds) -> Verdict:
+    fewer = other.walking / len(other) < reference.walking / len(reference)
+    later = _or_never(other.walk_from) > LATER * _or_never(reference.walk_from)
     return "holds" if fewer or later else "does not hold"
 
 
-def _speeds_up(reference: Seeds, others: Sequence[Seeds]) -> Verdict:
-    fewer = others[0].moving / len(others[0]) < reference.moving / len(reference)
-    later = _or_never(others[0].move_from) > LATER * _or_never(reference.move_from)
+def _speeds_up(reference: Seeds, other: Seeds) -> Verdict:
+    fewer = other.moving / len(other) < reference.moving / len(reference)
+    later = _or_never(other.move_from) > LATER * _or_never(reference.move_from)
     return "holds" if fewer or later else "does not hold"
 
 
-def _is_spared(reference: Seeds, others: Sequence[Seeds]) -> Verdict:
+def _is_spared(reference: Seeds, other: Seeds) -> Verdict:
     if reference.walking < len(reference):
         return _grade(reference.walking, len(reference))
-    later = _or_never(reference.walk_from) > LATER * _or_never(others[0].walk_from)
+    later = _or_never(reference.walk_from) > LATER * _or_never(other.walk_from)
     return "holds in part" if later else "holds"
 
 
 _COMPARISONS = {
     "bonus": (
         "At a change of state the total reward is multiplied by b = 200 (III-C).",
+        "multiply",
         _works_as_printed,
     ),
     "lock-out": (
         "The machine's order of contacts is all that a gait takes: no least time between two "
         "changes is named (III-C).",
+        "lockout-0",
         _walks_without_lockout,
     ),
     "observation": (
         "The policy sees the machine's state u and the steps δ since it changed: over S × U the "
         "reward is Markov again (III-B, III-C).",
+        "blind",
         _is_needed,
     ),
     "machine": (
         "Reward machines make learning a good deal faster, and keep robots from standing still "
         "(III-D, IV-B).",
+        "no-bonus",
         _speeds_up,
     ),
     "penalties": (
         "No factor λ that grows is needed on the penalties: in full from the start, they are "
         "learned with much quicker (III-D).",
+        "curriculum",
         _is_spared,
     ),
-    "gains": ("Joints are held with Kp = 3 and Kd = 0.2 (IV-A).", _works_as_printed),
+    "gains": ("Joints are held with Kp = 3 and Kd = 0.2 (IV-A).", "paper-gains", _works_as_printed),
 }
-"""Statement and judge of each group of settings; a judge sees the reference and the others."""
+"""Of each group: the statement, the setting that decides on it, and the judge of the reference and
+that setting."""
 
 
 def _told(label: str, seeds: Seeds) -> str:
