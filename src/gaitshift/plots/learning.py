@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from gaitshift.plots.palette import INK, QUIET, gait_colours
 from gaitshift.plots.style import DASHES, check_target, few_ticks, house_style, name_row, save
 
-Courses = Sequence[Float[np.ndarray, " n"]]
+Courses = Sequence[Float[np.ndarray, " _"]]
 """One quantity over the iterations, an array a seed; a run that broke down has a shorter one."""
 
 _SIZE = (7.5, 4.9)
