@@ -404,6 +404,7 @@ def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
 
     main([*arguments, "--json"])
     told = json.loads(capsys.readouterr().out)
+    assert {path: path.stat().st_mtime_ns for path in first} == first, "done once is done"
     assert {path.name for path in out.iterdir()} == set(told["files"])
     assert {"README.md", "reward.png", "ablations.png", "contacts-pace.png"} <= set(told["files"])
     assert len(told["findings"]) == 10
