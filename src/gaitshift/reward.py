@@ -93,6 +93,7 @@ def walk_reward(
     agreement: Float[np.ndarray, " N"],
     bounces: Float[np.ndarray, " N"],
     action_change: Float[np.ndarray, "N 12"],
+    penalty_scale: float = 1.0,
 ) -> RewardTerms:
     """R_walk, term by term (Table I and the additions).
 
@@ -104,13 +105,14 @@ def walk_reward(
         agreement: share of the feet that are as the stance of the machine's state has them.
         bounces: number of feet that bounced in this step, times the present strictness.
         action_change: action minus the action before it.
+        penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """
     velocity = motion.base_linear_velocity_b
     rate = motion.base_angular_velocity_b
     sideways = velocity[:, 1:]
     speed_error_squared = np.square(command.forward_speed - velocity[:, 0])
     foot_speed_squared = _squares(motion.foot_velocity_w[..., :2])
-    return {
+    terms = {
         "forward_velocity": config.forward_velocity * np.exp(-speed_error_squared),
         "lateral_velocity": config.lateral_velocity * _squares(sideways),
         "roll_pitch_rate": config.roll_pitch_rate * _squares(rate[:, :2]),
@@ -125,6 +127,10 @@ def walk_reward(
         "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
         "bounce": config.bounce * bounces,
         "action_rate": config.action_rate * _squares(action_change),
+    }
+    return {
+        name: penalty_scale * term if getattr(config, name) < 0 else term
+        for name, term in terms.items()
     }
 
 

@@ -27,7 +27,7 @@ def _split_numbers(text: str) -> tuple[float, ...]:
         raise GaitshiftError(f"times '{text}': numbers with commas between, like 2,5,8") from None
 
 
-_names = tyro.constructors.PrimitiveConstructorSpec[tuple[str, ...]](
+names_option = tyro.constructors.PrimitiveConstructorSpec[tuple[str, ...]](
     nargs=1,
     metavar="GAIT,GAIT,…",
     instance_from_str=lambda args: _split(args[0]),
@@ -47,7 +47,7 @@ _numbers = tyro.constructors.PrimitiveConstructorSpec[tuple[float, ...]](
 class Demo(DemoConfig):
     """Watch a robot cross flat and rough ground and shift its gait by itself."""
 
-    gaits: Annotated[tuple[str, ...], _names] = ()
+    gaits: Annotated[tuple[str, ...], names_option] = ()
     """Gaits to show in a row instead, on a schedule and without the condition, such as
     trot,bound,pace,trot."""
     at: Annotated[tuple[float, ...], _numbers] = ()

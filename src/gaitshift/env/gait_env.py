@@ -61,6 +61,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         heights of the machine's guards and on the price of a bounce."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
+        self.penalty_scale = 1.0
+        """The factor λ on all penalties now, 0 to 1 (paper III-D, where it is always 1)."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
             -np.inf, np.inf, (self.observe.size,), np.float32
@@ -111,6 +113,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             agreement=agreement,
             bounces=self.strictness * self._bounces(motion),
             action_change=action - self._last_action,
+            penalty_scale=self.penalty_scale,
         )
         reward = with_bonus(self.config.reward, np.sum(list(terms.values()), axis=0), bonus)
         self._last_action = action

@@ -107,10 +107,16 @@ class Recipe:
     speeds and frequencies."""
     command_until: int = 300
     """Iteration at which commands are drawn from all of the gait's ranges."""
+    penalty_start: float = 1.0
+    """The factor λ on all penalties at the first iteration; 1: no curriculum (paper III-D)."""
+    penalty_until: int = 200
+    """Iteration at which λ has grown to 1, by the same step each iteration."""
     checkpoint_every: int = 50
     """Iterations between two checkpoints."""
     threads: int = 2
-    """Threads of torch; the physics takes all cores."""
+    """Threads of torch."""
+    physics_threads: int = 0
+    """Threads of the physics; 0: one a core."""
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -118,6 +124,9 @@ class Recipe:
             ("steps", 1, 100_000),
             ("checkpoint_every", 1, 1_000_000),
             ("threads", 1, 1024),
+            ("physics_threads", 0, 1024),
+            ("penalty_start", 0.0, 1.0),
+            ("penalty_until", 1, 1_000_000),
         ):
             value = getattr(self, name)
             if not low <= value <= high:
@@ -152,6 +161,11 @@ class Recipe:
     def command_scale(self, iteration: int) -> float:
         """Share of the gait's ranges that commands are drawn from at this iteration."""
         return _grown(iteration, self.command_from, self.command_until)
+
+    def penalty_scale(self, iteration: int) -> float:
+        """The factor λ on all penalties at this iteration (paper III-D)."""
+        first = self.penalty_start
+        return first + (1.0 - first) * _grown(iteration, 0, self.penalty_until)
 
     @classmethod
     def paper(cls) -> "Recipe":

@@ -53,7 +53,13 @@ class Run:
         self._wall = 0.0
         torch.set_num_threads(recipe.threads)
         torch.manual_seed(seed)
-        env = GaitEnv(machine, flat(FIELD, FIELD), recipe.robots, config=recipe.env)
+        env = GaitEnv(
+            machine,
+            flat(FIELD, FIELD),
+            recipe.robots,
+            config=recipe.env,
+            threads=recipe.physics_threads,
+        )
         self.learner = Learner(env, recipe)
 
     @classmethod
@@ -151,6 +157,7 @@ class Run:
             env.push_at_most(stage.push)
         env.strictness = self.recipe.strictness(self.iteration)
         env.command_scale = self.recipe.command_scale(self.iteration)
+        env.penalty_scale = self.recipe.penalty_scale(self.iteration)
         if self._is_checkpoint():
             self.learner.start_episodes(_seed_at(self.seed, self.iteration))
         seen = self.learner.iterate()

@@ -1,0 +1,1 @@
+"""The paper's recipe run as printed, and with one thing changed at a time; findings in figures."""
