@@ -101,7 +101,7 @@ def commanded(env, observation):
         observation[:, env.observe.slices[name]][:, 0].astype(float)
         for name in ("forward_speed_command", "stride_command")
     )
-    return speed, 40.0 * stride  # two states in units of 20 steps
+    return speed, 20.0 * stride  # in units of 20 steps
 
 
 # Gymnasium's contract ---------------------------------------------------------------------------
@@ -507,35 +507,38 @@ def test_an_environment_tells_what_may_be_commanded():
     }
 
 
-# The price of a touchdown -----------------------------------------------------------------------
-
-TOUCHDOWNS = [
-    # feet of robot 0, how many of them came down | of robot 1
-    ("FL FR BL BR", None, "FL FR BL BR", None),
-    ("FL BR", 0, "", 0),
-    ("FR BL", 2, "", 0),
-    ("FR BL", 0, "BL", 1),
-    ("FR BL BR", 1, "FL BL BR", 2),
-    ("FR BR", 0, "FL FR", 1),
-    ("", 0, "FL FR BL BR", 2),
-    ("FL FR BL BR", 4, "FL FR BL BR", 0),
-]
+# The price of a bounce --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
-def test_feet_that_come_down_are_paid_for_once_each_in_proportion_to_strictness(
+def test_feet_that_touch_again_too_soon_are_paid_for_in_proportion_to_strictness(
     strictness, monkeypatch
 ):
+    """Beside a loop over feet that looks back for the step in which each last touched."""
     env = hop(2)
     env.reset(seed=0)
     env.strictness = strictness
     contact = feed(env, monkeypatch)
-    for one, first, other, second in TOUCHDOWNS:
-        contact[:] = [[foot in feet.split() for foot in FEET] for feet in (one, other)]
+    rng = np.random.default_rng(3)
+    # Spells on the ground and in the air of 1 to 14 steps, the first in the air.
+    spells = rng.integers(1, 15, size=(2, 4, 40))
+    shown = np.array(
+        [[np.resize(np.repeat(np.arange(40) % 2, s), 200) for s in feet] for feet in spells], bool
+    )
+    paid = 0
+    for t in range(200):
+        contact[:] = shown[:, :, t]
         *_, info = env.step(np.zeros((2, 12)))
-        if first is not None:
-            expected = -10.0 * strictness * np.array([first, second])
-            np.testing.assert_allclose(info["reward_terms"]["touchdown"], expected)
+        expected = np.zeros(2)
+        for robot in range(2):
+            for foot in range(4):
+                before = [s for s in range(t) if shown[robot, foot, s]]
+                in_air = t - before[-1] - 1 if before else 1000
+                expected[robot] += shown[robot, foot, t] and 0 < in_air < 8
+        paid += expected.sum()
+        price = env.config.reward.bounce * strictness
+        np.testing.assert_allclose(info["reward_terms"]["bounce"], price * expected)
+    assert paid > 20
 
 
 # The ends of episodes ---------------------------------------------------------------------------

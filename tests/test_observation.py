@@ -57,6 +57,7 @@ SIZES = {
     "forward_speed_command": 1,
     "yaw_rate_command": 1,
     "stride_command": 1,
+    "wait": 1,
     "last_action": 12,
 }
 """S × U in the paper's order (III-C), then the commands and the last action."""
@@ -125,8 +126,10 @@ HAND_TABLE = {
     "contact": [[1, 0, 0, 0], [0, 1, 1, 0]],
     "forward_speed_command": [[1.2], [0.4]],
     "yaw_rate_command": [[-0.3], [0.2]],
-    # A stride of 0.4 s is 40 steps, two states of 20 each; one of 0.625 s, two of 31.25 each.
-    "stride_command": [[1.0], [1.5625]],
+    # Strides of 0.4 s and 0.625 s are 40 and 62.5 steps, in units of 20.
+    "stride_command": [[2.0], [3.125]],
+    # A state of 20 steps of which the eighth begins: 12 are left; of the other none.
+    "wait": [[0.6], [0.0]],
     "last_action": [
         [0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6],
         [-1, -2, -3, -4, -5, -6, -7, -8, -9, -10, -11, -12],
@@ -183,7 +186,7 @@ def test_a_robot_is_shown_the_same_alone_as_among_others():
 
 
 def test_an_unknown_slice_is_refused_with_those_there_are():
-    with pytest.raises(GaitshiftError, match="'smell'; known: machine_state, steps_in_state, "):
+    with pytest.raises(GaitshiftError, match="'smell'; known: machine_state, wait, steps_in_state, "):
         Observation(TROT, ("contact", "smell"))
 
 
