@@ -6,7 +6,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?=
-GAITS ?= trot pace bound
+GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
 
 # Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.

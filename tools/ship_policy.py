@@ -1,8 +1,10 @@
 """Ships a trained policy: the network, its curve and its figures go into the package.
 
-Usage: python tools/ship_policy.py RUN...     (`make policies` trains and ships all)
+Usage: python tools/ship_policy.py [--trials all|short|quick] RUN...     (`make policies` trains and
+ships all)
 """
 
+import argparse
 import csv
 import json
 import shutil
@@ -20,11 +22,11 @@ COLUMNS = ("iteration", "stage", "steps", "wall_s", "reward", "speed", "survival
 EVERY = 10
 
 
-def ship(run: Path) -> None:
+def ship(run: Path, trials: str) -> None:
     """Copies the policy of `run`, thins its curve, and puts it through the standard trials."""
     loaded = policy.load(run / "policy.onnx")
     name = loaded.gait
-    rows, figures, log = run_trials(loaded, SIZES["all"])
+    rows, figures, log = run_trials(loaded, SIZES[trials])
     print(name, json.dumps([row.to_dict() for row in rows]))
     DIAGRAMS.mkdir(parents=True, exist_ok=True)
     hildebrand_diagram(log, figures, loaded.machine, DIAGRAMS / f"{name}.png")
@@ -32,7 +34,7 @@ def ship(run: Path) -> None:
     record = {
         **loaded.info.training,
         "evaluation": {
-            "command": f"gaitshift evaluate {name} --trials all",
+            "command": f"gaitshift evaluate {name} --trials {trials}",
             "trials": [row.to_dict() for row in rows],
             "flat": figures,
         },
@@ -57,5 +59,9 @@ def _rounded(value: object) -> object:
 
 
 if __name__ == "__main__":
-    for argument in sys.argv[1:]:
-        ship(Path(argument))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", choices=tuple(SIZES), default="all")
+    parser.add_argument("runs", nargs="+", type=Path)
+    options = parser.parse_args()
+    for folder in options.runs:
+        ship(folder, options.trials)

@@ -38,9 +38,9 @@ class Evaluate(EvaluationConfig):
 
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
-    trials: Literal["all", "quick"] | None = None
+    trials: Literal["all", "short", "quick"] | None = None
     """Run the standard trials instead, each figure against its limit: all (1000 pushed episodes,
-    then 256 of 20 s on each ground), or quick ones for a first look."""
+    then 256 of 20 s on each ground), short (a quarter of each), or quick ones for a first look."""
     json: bool = False
     """One JSON object on stdout."""
     log: Path | None = None
@@ -82,7 +82,7 @@ class Evaluate(EvaluationConfig):
         return figures, log
 
     def _try(
-        self, loaded: policies.Policy, size: Literal["all", "quick"]
+        self, loaded: policies.Policy, size: Literal["all", "short", "quick"]
     ) -> tuple[dict[str, Any], Log]:
         with progress(f"trials of {loaded.gait}") as report:
             rows, figures, log = run_trials(loaded, SIZES[size], self.seed, report)
