@@ -8,8 +8,9 @@ import argparse
 import csv
 import json
 import shutil
-import sys
 from pathlib import Path
+
+from gait_results import PAGE, page
 
 from gaitshift import policy
 from gaitshift.evaluation import SIZES, run_trials
@@ -65,3 +66,4 @@ if __name__ == "__main__":
     options = parser.parse_args()
     for folder in options.runs:
         ship(folder, options.trials)
+    PAGE.write_text(page())

@@ -1,0 +1,130 @@
+"""Writes docs/results/gaits.md: every shipped policy's figures and trials, from their records.
+
+Usage: python tools/gait_results.py     (`tools/ship_policy.py` calls it at its end)
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from gaitshift import gaits, policy
+from gaitshift.gait_analysis import FIRST_GAITS
+from gaitshift.legs import LEGS
+
+POLICIES = Path(policy.__file__).parent / "policies"
+PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"
+
+HEAD = """# The shipped gaits
+
+One policy a gait, one recipe for all of them (`gaitshift train GAIT`), seed 0. Flat ground, no
+exploration, at the speed and frequency the gait is at home at, the first 2 s left out. Figures are
+defined in `gaitshift.gait_analysis`, limits in `gait_analysis/limits.py` and `evaluation/trials.py`.
+This page is made by `tools/gait_results.py` from the records beside the policies.
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    names = [*FIRST_GAITS, *(name for name in policy.shipped() if name not in FIRST_GAITS)]
+    records = {name: json.loads((POLICIES / f"{name}.json").read_text()) for name in names}
+    parts = [HEAD, _figures(records), "## Trials\n", _trials(records)]
+    parts += [_gait(name, record) for name, record in records.items()]
+    return "\n".join(parts)
+
+
+def _figures(records: dict[str, Any]) -> str:
+    rows = []
+    for name, record in records.items():
+        flat = record["evaluation"]["flat"]
+        verdict = flat["verdict"]
+        rows.append(
+            (
+                name,
+                f"{verdict['gait']}, {'clean' if verdict['clean'] else 'not clean'}",
+                f"{flat['speed_mean']:.2f}",
+                f"{flat['cycles_per_s']:.2f}",
+                f"{flat['pattern_fraction']:.2f}",
+                _feet(flat["touchdowns_per_cycle"]),
+                _feet(flat["phase"]),
+                f"{min(flat['phase_consistency']):.2f}",
+                _feet(flat["duty_factor"]),
+                f"{100 * min(flat['clearance']):.0f}",
+                f"{flat['cost_of_transport']:.2f}",
+            )
+        )
+    legs = " ".join(LEGS)
+    head = (
+        "gait",
+        "named",
+        "speed [m/s]",
+        "cycles [Hz]",
+        "pattern",
+        f"touchdowns a cycle, {legs}",
+        f"phase, {legs}",
+        "least consistency",
+        f"duty factor, {legs}",
+        "least clearance [cm]",
+        "cost of transport",
+    )
+    return _table(head, rows)
+
+
+def _trials(records: dict[str, Any]) -> str:
+    """One row a trial on its ground, one column a gait; in bold what misses its limit."""
+    trials = {
+        name: {row["trial"]: row for row in record["evaluation"]["trials"] if _is_ground(row)}
+        for name, record in records.items()
+    }
+    titles = list(dict.fromkeys(title for rows in trials.values() for title in rows))
+    body = [(title, *(_value(rows.get(title)) for rows in trials.values())) for title in titles]
+    return _table(("trial", *trials), body)
+
+
+def _is_ground(row: dict[str, Any]) -> bool:
+    return row["trial"].startswith(("survival", "lateral_error"))
+
+
+def _gait(name: str, record: dict[str, Any]) -> str:
+    machine = gaits.load(name)
+    misses = [
+        f"{row['trial']}: {_plain(row['value'])}, limit {_limit(row)}"
+        for row in record["evaluation"]["trials"]
+        if row["passed"] is False
+    ]
+    lines = [f"## {machine.title}\n", f"{machine.description}\n"]
+    lines.append(f"![Gait diagram and phases of {name}](gaits/{name}.png)\n")
+    lines.append(f"Made by `{record['command']}`, judged by `{record['evaluation']['command']}`.")
+    lines.append(f"[Its training](training/{name}.png).\n")
+    lines += (
+        ["Misses:\n", *(f"- {miss}" for miss in misses), ""] if misses else ["Misses nothing.\n"]
+    )
+    return "\n".join(lines)
+
+
+def _value(row: dict[str, Any] | None) -> str:
+    if row is None:
+        return ""
+    text = _plain(row["value"])
+    return f"**{text}**" if row["passed"] is False else text
+
+
+def _plain(value: float | None) -> str:
+    return "never arrived" if value is None else f"{value:.3f}"
+
+
+def _limit(row: dict[str, Any]) -> float:
+    return row["at_least"] if "at_least" in row else row["at_most"]
+
+
+def _feet(values: list[float]) -> str:
+    return " ".join(f"{value:.2f}" for value in values)
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page())
+    print(f"written: {PAGE}")
