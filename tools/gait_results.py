@@ -17,8 +17,9 @@ PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"
 HEAD = """# The shipped gaits
 
 One policy a gait, one recipe for all of them (`gaitshift train GAIT`), seed 0. Flat ground, no
-exploration, at the speed and frequency the gait is at home at, the first 2 s left out. Figures are
-defined in `gaitshift.gait_analysis`, limits in `gait_analysis/limits.py` and `evaluation/trials.py`.
+exploration, at the speed and frequency the gait is at home at, the first 2 s left out. Figures
+are defined in `gaitshift.gait_analysis`, limits in `gait_analysis/limits.py` and
+`evaluation/trials.py`; what misses its limit is in bold.
 This page is made by `tools/gait_results.py` from the records beside the policies.
 """
 
