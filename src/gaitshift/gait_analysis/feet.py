@@ -45,12 +45,18 @@ def _where(known: list[bool], values: Float[np.ndarray, " 4"]) -> list[Figure]:
 
 
 def _touchdowns_per_cycle(sample: Sample, machines: Mapping[str, RewardMachine]) -> PerFoot:
-    gait = sample.log.gait[sample.entries(machines)]
-    counts = np.bincount(gait, minlength=len(sample.log.gaits))
+    """Onsets over what whole cycles ask for: of each robot from its first to its last entry.
+
+    Over the whole time half a cycle at either end would count on one side alone.
+    """
+    entry = sample.entries(machines)
+    before = entry.cumsum(axis=0) - entry
+    inside = (before >= 1) & (before < entry.sum(axis=0))
+    counts = np.bincount(sample.log.gait[entry & inside], minlength=len(sample.log.gaits))
     expected = counts @ np.array([machines[name].touchdowns for name in sample.log.gaits])
     if not expected.all():
         return None
-    return (sample.onsets.sum(axis=(0, 1)) / expected).tolist()
+    return ((sample.onsets & inside[..., None]).sum(axis=(0, 1)) / expected).tolist()
 
 
 def _clearance(sample: Sample, leg: int) -> Figure:

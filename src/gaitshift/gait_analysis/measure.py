@@ -32,8 +32,8 @@ def measure(
     - `slip` [m/s]: mean horizontal speed of the feet in contact.
     - `pattern_fraction`: share of steps whose contacts are a stance set of the gait's machine.
     - `cycles_per_s` [Hz]: full cycles of the machine, counted by entries into its first state.
-    - `touchdowns_per_cycle` (4,): raw contact onsets of each foot over those that the machine's
-      cycles ask for: 1 where no foot bounces, in gaits too that set a foot down twice a cycle.
+    - `touchdowns_per_cycle` (4,): raw contact onsets of each foot over those that the machine
+      asks for, in whole cycles: 1 where no foot bounces, also where it comes down twice a cycle.
     - `phase` (4,) [stride of FL], `phase_consistency` (4,): circular mean and resultant length of
       touchdowns within the strides of FL (`phase.Phases`), 0 and 1 for FL itself.
     - `duty_factor` (4,): share of steps each foot is down.

@@ -60,7 +60,8 @@ def hildebrand_diagram(
         circle = figure.add_axes((0.709, 0.10, 0.24, 0.65), projection="polar")
         draw_phase_circle(circle, figures, machine)
         figure.text(0.015, 0.95, machine.title, size=19, weight="bold", color=colour, va="top")
-        figure.text(0.015, 0.855, _headline(figures), size=13, color=INK, va="top")
+        figure.text(0.64, 0.935, _pace(figures), size=13, color=INK, ha="right", va="top")
+        figure.text(0.015, 0.85, _verdict(figures["verdict"]), size=12, color=INK, va="top")
         figure.text(0.829, 0.95, "touchdown within the stride of FL", ha="center", va="top")
         figure.text(
             0.829,
@@ -75,19 +76,19 @@ def hildebrand_diagram(
     return figure
 
 
-def _headline(figures: Mapping[str, Any]) -> str:
-    verdict = figures["verdict"]
-    parts = [
-        _number(figures["speed_mean"], "{:.2f} m/s"),
-        _number(figures["cycles_per_s"], "{:.2f} cycles/s"),
-        f"named by its contacts: {verdict['gait']} ({max(verdict['scores'].values()):.2f})",
-        "clean" if verdict["clean"] else f"not clean: {_misses(verdict['misses'])}",
+def _pace(figures: Mapping[str, Any]) -> str:
+    """Speed and cycles of the machine, as far as they are known."""
+    forms = {"speed_mean": "{:.2f} m/s", "cycles_per_s": "{:.2f} cycles/s"}
+    known = [
+        form.format(figures[name]) for name, form in forms.items() if figures[name] is not None
     ]
-    return "   ·   ".join(part for part in parts if part)
+    return "   ·   ".join(known)
 
 
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else form.format(value)
+def _verdict(verdict: Mapping[str, Any]) -> str:
+    score = max(verdict["scores"].values())
+    clean = "clean" if verdict["clean"] else f"not clean: {_misses(verdict['misses'])}"
+    return f"named by its contacts: {verdict['gait']} ({score:.2f})   ·   {clean}"
 
 
 def _misses(misses: list[dict[str, Any]]) -> str:
