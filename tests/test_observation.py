@@ -186,9 +186,7 @@ def test_a_robot_is_shown_the_same_alone_as_among_others():
 
 
 def test_an_unknown_slice_is_refused_with_those_there_are():
-    with pytest.raises(
-        GaitshiftError, match="'smell'; known: machine_state, wait, "
-    ):
+    with pytest.raises(GaitshiftError, match="'smell'; known: machine_state, wait, "):
         Observation(TROT, ("contact", "smell"))
 
 

@@ -29,7 +29,7 @@ CONFIG = replace(
     stance_pattern=3.0,
     slip=-0.5,
     power=-0.5,
-    bounce=-7.0,
+    chatter=-7.0,
     action_rate=-0.02,
 )
 """Table I and round numbers for what is ours."""
@@ -97,7 +97,7 @@ def three_robots():
         ),
         "stance": STANCE,
         "agreement": np.array([1.0, 0.75, 0.5]),
-        "bounces": np.array([2.0, 0.0, 0.75]),
+        "chatter": np.array([2.0, 0.0, 0.75]),
         "action_change": np.stack([0.1 * RAMP, np.zeros(12), -np.ones(12)]),
     }
 
@@ -130,7 +130,7 @@ HAND_TABLE = {
     # -7 · two feet; no foot; -7 · three feet at a strictness of a quarter
     # -0.5 · 0.5 · 650; -0.5 on a joint that turns while another one pushes; nothing
     "power": (-162.5, 0.0, 0.0),
-    "bounce": (-14.0, 0.0, -5.25),
+    "chatter": (-14.0, 0.0, -5.25),
     # -0.02 · 0.01 · 650; nothing; -0.02 · 12
     "action_rate": (-0.13, 0.0, -0.24),
 }
@@ -178,7 +178,7 @@ def test_perfect_motion_earns_every_reward_whole_and_no_penalty():
         ),
         stance=STANCE,
         agreement=np.ones(1),
-        bounces=np.zeros(1),
+        chatter=np.zeros(1),
         action_change=np.zeros((1, 12)),
     )
     earned = {name: term.item() for name, term in terms.items() if term.item() != 0}

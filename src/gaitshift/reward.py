@@ -22,7 +22,7 @@ ADDITIONS = (
     "stance_pattern",
     "slip",
     "power",
-    "bounce",
+    "chatter",
     "action_rate",
 )
 """The terms that are ours; every other one is Table I's."""
@@ -61,9 +61,9 @@ class RewardConfig:
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
     power: float = -0.015
     """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
-    bounce: float = -30.0
-    """Times the feet that touch again within `env.BOUNCE` of having left the ground, and the
-    environment's strictness; ours: a clean cycle has one touchdown a foot."""
+    chatter: float = -30.0
+    """Times the feet that come down again before the machine has lifted them again, and the
+    environment's strictness; ours: one touchdown a swing is clean, and free at any frequency."""
     action_rate: float = -0.02
     """Times ‖a - a_last‖²; ours: smooth targets."""
     bonus: float = 200.0
@@ -91,7 +91,7 @@ def walk_reward(
     *,
     stance: Float[np.ndarray, " 12"],
     agreement: Float[np.ndarray, " N"],
-    bounces: Float[np.ndarray, " N"],
+    chatter: Float[np.ndarray, " N"],
     action_change: Float[np.ndarray, "N 12"],
     penalty_scale: float = 1.0,
 ) -> RewardTerms:
@@ -103,7 +103,7 @@ def walk_reward(
         command: what was asked for.
         stance: q_init [rad].
         agreement: share of the feet that are as the stance of the machine's state has them.
-        bounces: number of feet that bounced in this step, times the present strictness.
+        chatter: number of feet that came down a second time, times the present strictness.
         action_change: action minus the action before it.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """
@@ -125,7 +125,7 @@ def walk_reward(
         "stance_pattern": config.stance_pattern * (agreement == 1.0),
         "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
         "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
-        "bounce": config.bounce * bounces,
+        "chatter": config.chatter * chatter,
         "action_rate": config.action_rate * _squares(action_change),
     }
     return {

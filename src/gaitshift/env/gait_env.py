@@ -20,12 +20,6 @@ from gaitshift.robot import ANYMAL_B, Robot
 from gaitshift.terrain import Terrain
 from gaitshift.world import Pusher, World
 
-BOUNCE = 8
-"""A foot that touches after fewer control steps in the air than this has bounced (0.08 s).
-
-Ours: the shortest swing of any gait, of three-one's hind feet at the highest frequency, is 9 steps.
-"""
-
 Observations = Float32[np.ndarray, "N D"]
 
 
@@ -58,7 +52,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
         self.strictness = 1.0
         """How much of what only a clean gait can give is asked for now, 0 to 1: factor on the swing
-        heights of the machine's guards and on the price of a bounce."""
+        heights of the machine's guards and on the price of chatter."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.penalty_scale = 1.0
@@ -95,8 +89,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         self.world.push(self._pusher.step())
         motion = self.world.step(self._stance + self.robot.action_scale * action)
+        chatter = self._chatter(motion)
+        left = self._state
         self._state, changed, bonus = self.machine.step(
-            self._state,
+            left,
             motion.contact,
             motion.clearance,
             self._steps_in_state,
@@ -104,6 +100,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             swing_scale=self.strictness,
         )
         self._steps_in_state = np.where(changed, 0, self._steps_in_state + 1)
+        self._may_land |= self.machine.lifted(left, self._state)
         agreement = self.machine.agreement(self._state, motion.contact)
         terms = walk_reward(
             self.config.reward,
@@ -111,7 +108,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             self._command,
             stance=self._stance,
             agreement=agreement,
-            bounces=self.strictness * self._bounces(motion),
+            chatter=self.strictness * chatter,
             action_change=action - self._last_action,
             penalty_scale=self.penalty_scale,
         )
@@ -154,7 +151,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
-        self._air_steps: Int[np.ndarray, "N 4"] = np.full((n, 4), BOUNCE)
+        self._stood: Bool[np.ndarray, "N 4"] = np.zeros((n, 4), dtype=bool)
+        self._may_land: Bool[np.ndarray, "N 4"] = np.ones((n, 4), dtype=bool)
         self._line: Float[np.ndarray, " N"] = np.zeros(n)
         self._heading: Float[np.ndarray, " N"] = np.zeros(n)
         self._command = self._own_command(n)
@@ -187,17 +185,19 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._steps_in_state[ids] = 0
         self._age[ids] = 0
         self._last_action[ids] = 0.0
-        self._air_steps[ids] = BOUNCE
+        self._stood[ids] = False
+        self._may_land[ids] = True
         self._line[ids] = self._heading[ids] = yaw
         self._draw_commands(ids)
         self._update_command()
 
-    def _bounces(self, motion: Motion) -> Int[np.ndarray, " N"]:
-        """How many feet of each robot touch again shortly after they left the ground."""
-        down = motion.contact
-        bounced = down & (self._air_steps > 0) & (self._air_steps < BOUNCE)
-        self._air_steps = np.where(down, 0, self._air_steps + 1)
-        return bounced.sum(axis=1)
+    def _chatter(self, motion: Motion) -> Int[np.ndarray, " N"]:
+        """How many feet of each robot come down again before the machine has lifted them."""
+        lands = motion.contact & ~self._stood
+        again = lands & ~self._may_land
+        self._may_land &= ~lands
+        self._stood = motion.contact
+        return again.sum(axis=1)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:

@@ -52,6 +52,9 @@ class Lookup:
     stance: Int[np.ndarray, " states"]
     """Contact label of each state's stance, -1 for an accepting state."""
 
+    down: Bool[np.ndarray, "states 4"]
+    """Feet down in each state's stance; none for an accepting state."""
+
     is_stance: Bool[np.ndarray, " 16"]
     """Whether a contact label is the stance of any state."""
 
@@ -89,6 +92,7 @@ class Lookup:
             up=np.array([*up, [False] * len(LEGS)]),
             bonus=np.array([edge.bonus for edge in edges] + [0.0]),
             stance=stance,
+            down=np.array([[leg in s.stance for leg in LEGS] for s in states]),
             is_stance=np.isin(np.arange(LABEL_COUNT), stance),
             agreement=_agreement(stance).ravel(),
             fitting_state=_agreement(stance).argmax(axis=0),

@@ -161,6 +161,13 @@ class RewardMachine:
             bonus=np.where(changed, rows.bonus[edge], 0.0),
         )
 
+    def lifted(
+        self, left: Int[np.ndarray, " N"], entered: Int[np.ndarray, " N"]
+    ) -> Bool[np.ndarray, "N 4"]:
+        """Feet that stand in the stance of the state left and not in that of the state entered."""
+        stance = self._lookup.down
+        return stance[left] & ~stance[entered]
+
     def wait(
         self,
         state: Int[np.ndarray, " N"],

@@ -97,7 +97,7 @@ class Recipe:
     """Control steps of each robot in an iteration; ours (the paper has 100)."""
     strict_from: int = 60
     """Iteration from which the environment's strictness grows from 0; ours: asked for in full from
-    the start, swing heights and the price of bounces hide the cycle from exploration."""
+    the start, swing heights and the price of chatter hide the cycle from exploration."""
     strict_until: int = 210
     """Iteration at which it has grown."""
     strict_share: float = 1.0
