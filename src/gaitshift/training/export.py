@@ -82,7 +82,7 @@ def write(
         else:
             raise TypeError(f"cannot export a layer of type {type(layer).__name__}")
     nodes[-1].output[0] = "action"
-    inputs = max(end for _, end in info.observation.values())
+    inputs = next(layer.in_features for layer in layers if isinstance(layer, torch.nn.Linear))
     observation = helper.make_tensor_value_info("observation", TensorProto.FLOAT, ["N", inputs])
     action = helper.make_tensor_value_info("action", TensorProto.FLOAT, ["N", 12])
     graph = helper.make_graph(nodes, "policy", [observation], [action], constants)
