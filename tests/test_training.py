@@ -34,7 +34,8 @@ TINY = Recipe(
             iterations=3,
             amplitude=0.1,
             slope=8.0,
-            rise=0.04,
+            stair=0.04,
+            step=0.06,
             redraw_every=2,
             push=100.0,
         ),
@@ -207,7 +208,7 @@ def test_each_iteration_has_its_stage_and_its_number_within_it():
     assert (stage.name, within) == ("c", 8), "beyond the end the last stage goes on"
 
 
-ROUGH = Stage(name="rough", iterations=50, amplitude=0.15, slope=12.0, rise=0.06)
+ROUGH = Stage(name="rough", iterations=50, amplitude=0.15, slope=12.0, stair=0.06, step=0.1)
 
 
 def measures(ground):
@@ -236,20 +237,20 @@ def test_the_same_numbers_give_the_same_grounds_and_others_others():
     assert drawn(5, 1) == drawn(5, 1)
     for other in (drawn(10, 1), drawn(5, 2)):
         assert all(one != another for one, another in zip(drawn(5, 1), other, strict=True))
-    assert len(set(drawn(5, 1))) == 6, "and no two robots' fields are alike"
+    assert len(set(drawn(5, 1))) == 8, "and no two robots' fields are alike"
 
 
 def test_half_of_the_fields_are_noise_and_the_others_slopes_and_stairs():
     for within in (0, 20, 45):
         grounds = draw_grounds(ROUGH, within, 3)
-        assert sorts(grounds) == ["noise"] * 3 + ["plane"] * 2 + ["stairs"]
+        assert sorts(grounds) == ["noise"] * 4 + ["plane"] * 2 + ["stairs"] * 2
         assert len({ground.extent for ground in grounds}) == 1, "robots share one rectangle"
 
 
 def test_slopes_rise_in_any_direction():
     angles = []
     for within in range(0, 50, 2):
-        for ground in draw_grounds(ROUGH, within, 0)[3:5]:
+        for ground in draw_grounds(ROUGH, within, 0)[4:6]:
             along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
             angles.append(np.arctan2(along_y.mean(), along_x.mean()))
     quarters = np.bincount(np.floor(np.array(angles) / (np.pi / 2)).astype(int) + 2, minlength=4)
@@ -263,8 +264,8 @@ def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
             for within in range(0, 50, 2)
         ]
     )
-    limits = {"noise": (slice(0, 3), 0, 0.15), "plane": (slice(3, 5), 1, 12.0)}
-    limits["stairs"] = (slice(5, 6), 2, 0.06)
+    limits = {"noise": (slice(0, 4), 0, 0.15), "plane": (slice(4, 6), 1, 12.0)}
+    limits |= {"stairs": (slice(6, 7), 2, 0.06), "steps": (slice(7, 8), 2, 0.1)}
     for name, (fields_, measure, limit) in limits.items():
         most = found[:, fields_, measure].max(axis=1)
         assert most.max() <= limit * (1 + 1e-9), name
@@ -275,7 +276,7 @@ def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
 
 @pytest.mark.parametrize(
     ("measure", "rough"),
-    [("amplitude", [0, 1, 2]), ("slope", [3, 4]), ("rise", [5])],
+    [("amplitude", [0, 1, 2, 3]), ("slope", [4, 5]), ("stair", [6]), ("step", [7])],
 )
 def test_a_stage_of_one_kind_leaves_the_fields_of_the_others_level(measure, rough):
     stage = Stage(name="one", iterations=10, **{measure: 0.1})

@@ -196,7 +196,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         lands = motion.contact & ~self._stood
         again = lands & ~self._may_land
         self._may_land &= ~lands
-        self._stood = motion.contact
+        self._stood = motion.contact.copy()
         return again.sum(axis=1)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:

@@ -71,6 +71,9 @@ def _policies(results: Results) -> Iterator[tuple[str, int, int | None, str]]:
                 yield gait, job.seed, course.walks_at, job.name
 
 
-def _one(value: float | list[float]) -> float | None:
+def _one(value: float | list[float] | None) -> float | None:
+    """The figure, or its mean over the feet; None where there was nothing to measure."""
+    if value is None:
+        return None
     number = fmean(value) if isinstance(value, list) else float(value)
     return number if isfinite(number) else None
