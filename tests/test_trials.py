@@ -137,7 +137,9 @@ def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys
     assert len(said["trials"]) == len(TRIALS) + 7
     assert said["size"]["name"] == "quick"
     main(["evaluate", str(walk_file), "--trials", "quick"])
-    assert "limits kept" in capsys.readouterr().out
+    table = capsys.readouterr().out
+    assert "limits kept" in table
+    assert "speed_error [m/s]" in table
 
 
 @pytest.mark.parametrize(
