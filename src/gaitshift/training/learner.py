@@ -125,7 +125,7 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
     critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
     symmetric = config.mirror and env.machine.mirrored_states() is not None
-    ppo = PPO(
+    return PPO(
         actor,
         critic,
         storage,
@@ -141,9 +141,6 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         desired_kl=config.desired_kl,
         symmetry_cfg=_symmetry(env) if symmetric else None,
     )
-    for group in cast(list[dict[str, Any]], ppo.optimizer.param_groups):
-        group["fused"] = True  # one pass over the weights: small mini-batches take 30 % less time
-    return ppo
 
 
 def _symmetry(env: GaitEnv) -> dict[str, Any]:
