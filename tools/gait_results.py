@@ -23,7 +23,7 @@ are defined in `gaitshift.gait_analysis`, limits in `gait_analysis/limits.py` an
 This page is made by `tools/gait_results.py` from the records beside the policies.
 
 These policies come from the last steps towards today's recipe, so that training them anew gives
-other, similar ones: trot, pace, bound and gallop paid for feet that touched again within 0.08 s, where
+other, similar ones: trot, pace and bound paid for feet that touched again within 0.08 s, where
 `chatter` now stands, and all of them were trained with Adam's fused form.
 """
 
