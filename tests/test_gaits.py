@@ -220,3 +220,26 @@ def test_a_file_with_windows_line_ends_and_a_byte_order_mark_loads(tmp_path):
 def test_an_unknown_gait_is_refused_with_those_there_are(name, message):
     with pytest.raises(GaitshiftError, match=message):
         gaits.load(name)
+
+
+@pytest.mark.parametrize(
+    ("gait", "state", "steps", "dwell", "wait"),
+    [
+        ("trot", 0, 0, None, 19),  # 20 steps, of which the first ends now
+        ("trot", 1, 19, None, 0),
+        ("trot", 1, 40, None, 0),
+        ("trot", 0, 5, 30, 24),
+        ("gallop", 0, 3, None, 4),  # its states last 8 and 12 steps in turn
+        ("gallop", 1, 3, None, 8),
+        ("gallop", 1, 0, 14, 16),  # 1.2 times 14 is 16.8, and the seventeenth step may change
+    ],
+)
+def test_the_wait_is_the_steps_until_the_lock_out_opens(gait, state, steps, dwell, wait):
+    told = gaits.load(gait).wait(np.array([state]), np.array([steps]), dwell)
+    assert told.tolist() == [wait]
+
+
+def test_feet_are_lifted_by_a_change_that_takes_them_out_of_the_stance():
+    walk = gaits.load("walk")  # FL, BR, FR, BL are up in turn
+    told = walk.lifted(np.array([0, 1, 3, 2]), np.array([1, 2, 0, 2]))
+    assert told.astype(int).tolist() == [[0, 0, 0, 1], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 0]]

@@ -51,14 +51,14 @@ class GaitVecEnv(VecEnv):
         return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Robots share one environment, which has no attributes of theirs alone."""
-        raise NotImplementedError
+        """Refused with a `TypeError`: robots share one environment."""
+        raise TypeError(f"robots share one environment: '{attr_name}' of some cannot be set")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **_: Any
     ) -> list[Any]:
-        """Robots share one environment, which has no methods of theirs alone."""
-        raise NotImplementedError
+        """Refused with a `TypeError`: robots share one environment."""
+        raise TypeError(f"robots share one environment: '{method_name}' of some cannot be called")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
         """No robot has a wrapper."""
