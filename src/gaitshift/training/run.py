@@ -82,7 +82,7 @@ class Run:
                 )
             _clear(folder)
         run = cls(folder, machine, recipe, seed, command)
-        (folder / CHECKPOINTS).mkdir(parents=True, exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         config = {
             "command": command,
             "seed": seed,
@@ -90,7 +90,9 @@ class Run:
             "recipe": asdict(recipe),
             "versions": _versions(),
         }
+        # First of all, so that a folder left half made by a kill still shows what it is.
         (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
+        (folder / CHECKPOINTS).mkdir(exist_ok=True)
         run._save_checkpoint()
         return run
 
