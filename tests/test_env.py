@@ -244,6 +244,7 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
     env.reset(seed=1)
     motions = keep_motions(env, monkeypatch)
     states, deltas, changes, falls = [0] * 3, [0] * 3, 0, 0
+    swings = [[np.inf] * 4 for _ in range(3)]
     one_hot, delta_slice = env.observe.slices["machine_state"], env.observe.slices["steps_in_state"]
 
     def check(observation, robot):
@@ -258,12 +259,18 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
         for robot in range(3):
             contact = motion.contact[robot].tolist()
             clearance = motion.clearance[robot].tolist()
+            swing = swings[robot] = [
+                max(s, c) for s, c in zip(swings[robot], clearance, strict=True)
+            ]
             down, up, target, factor = EDGES[states[robot]]
             taken = (
                 deltas[robot] + 1 >= DWELL
                 and all(contact[foot] for foot in down)
-                and all(not contact[foot] and clearance[foot] >= SWING_HEIGHT for foot in up)
+                and all(not contact[foot] for foot in up)
             )
+            share = min(min(max(swing[foot] / SWING_HEIGHT, 0.0), 1.0) for foot in down)
+            if taken:  # the foot of the state left begins its swing
+                swing[states[robot]] = clearance[states[robot]]
             states[robot] = target if taken else states[robot]
             deltas[robot] = 0 if taken else deltas[robot] + 1
             changes += taken
@@ -274,12 +281,13 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
             weight = env.config.reward.stance_feet
             assert info["reward_terms"]["stance_feet"][robot] == weight * agreeing / 4
             terms = sum(float(term[robot]) for term in info["reward_terms"].values())
-            bonus = env.config.reward.bonus * factor if taken else 0.0
+            bonus = env.config.reward.bonus * factor * share if taken else 0.0
             assert reward[robot] == pytest.approx(terms + bonus, abs=1e-9)
             if terminated[robot] or truncated[robot]:
                 falls += bool(terminated[robot])
                 check(info["final_obs"], robot)
                 states[robot] = deltas[robot] = 0
+                swings[robot] = [np.inf] * 4
             check(observation, robot)
     assert changes > 10
     assert falls > 0
@@ -526,16 +534,44 @@ CHATTER = [
     *(("FL BR", 0),) * 20,
     ("FR BL", 0),
 ]
+WALK_CHATTER = [
+    # The same of a walking robot: the machine lifts FL, BR, FR, BL in turn.
+    ("FR BL BR", 0),
+    *(("FR BL BR", 0),) * 20,
+    ("FL FR BL", 0),  # FL lands, and BR is lifted
+    *(("FL FR BL", 0),) * 20,
+    ("FL BL BR", 0),  # BR lands, and FR is lifted
+    *(("FL BL BR", 0),) * 20,
+    ("FL FR BR", 0),  # FR lands, and BL is lifted
+    ("FR BR", 0),
+    ("FL FR BR", 1),  # FL has landed already
+]
+EARLY = [
+    # The same of a galloping robot: BR, BL, FR, FL in turn.
+    ("BR", 0),
+    ("BR FR", 1),  # two states too early
+    *(("BR", 0),) * 12,
+    ("BL", 0),
+    *(("BL", 0),) * 14,
+    ("BL FR", 0),  # the next one, before the machine changes
+    ("FR", 0),
+    ("FR BL", 1),  # lifted, but not due
+    *(("FR", 0),) * 12,
+    ("FL", 0),
+]
 
 
 @pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
-def test_feet_that_come_down_again_before_they_are_lifted_are_paid_for(strictness, monkeypatch):
+@pytest.mark.parametrize(
+    ("gait", "table"), [("trot", CHATTER), ("walk", WALK_CHATTER), ("gallop", EARLY)]
+)
+def test_feet_that_come_down_out_of_place_are_paid_for(gait, table, strictness, monkeypatch):
     config = EnvConfig(command_share=0.0)
-    env = GaitEnv(gaits.load("trot"), FLAT, 2, config=config, threads=1)
+    env = GaitEnv(gaits.load(gait), FLAT, 2, config=config, threads=1)
     env.reset(seed=0)
     env.strictness = strictness
     contact = feed(env, monkeypatch)
-    for feet, again in CHATTER:
+    for feet, again in table:
         contact[:] = [foot in feet.split() for foot in FEET]
         *_, info = env.step(np.zeros((2, 12)))
         paid = env.config.reward.chatter * strictness * again
@@ -802,24 +838,34 @@ def test_without_pushes_a_standing_robot_stays_where_it_stands():
     assert np.abs(env.world.motion.base_position_w - before)[:, :2].max() < 0.05
 
 
-@pytest.mark.parametrize("scale", [0.25, 1.0])
-def test_strictness_is_the_share_of_the_swing_height_that_feet_must_reach(scale, monkeypatch):
-    asked = 0.08
-    env = GaitEnv(with_swing_height(asked), FLAT, 4, config=EnvConfig(), threads=1)
-    env.strictness = scale
-    env.reset(seed=0)
-    motions = keep_motions(env, monkeypatch)
-    heights = []
+@pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
+def test_strictness_is_how_far_the_bonus_depends_on_the_swing(strictness, monkeypatch):
+    asked, step = 0.2, []
+    envs = [
+        GaitEnv(with_swing_height(height), FLAT, 4, config=EnvConfig(), threads=1)
+        for height in (0.0, asked)
+    ]
+    for env in envs:
+        env.strictness = strictness
+        env.reset(seed=0)
+    motions = keep_motions(envs[1], monkeypatch)
+    swing = np.full((4, 2), np.inf)  # of FL and FR, which land in turn
+    state = envs[1].observe.slices["machine_state"].start
     for action in arbitrary_actions(2, 150, 4, size=1.5):
-        *_, info = env.step(action)
-        motion = motions[-1]
-        front = np.where(motion.contact[:, :2], -np.inf, motion.clearance[:, :2])
-        heights += front.max(axis=1)[info["changed"]].tolist()
-    assert len(heights) > 5
-    assert scale * asked <= min(heights) < scale * asked + 0.03
+        (_, free, *_), (seen, paid, *_, info) = (env.step(action) for env in envs)
+        swing = np.maximum(swing, motions[-1].clearance[:, :2])
+        for robot in np.flatnonzero(info["changed"]):
+            entered = int(seen[robot, state] == 0.0)  # it stands on this one of the two now
+            share = np.clip(swing[robot, entered] / asked, 0.0, 1.0)
+            full = env.config.reward.bonus * HOP.edges[1 - entered].bonus
+            lost = strictness * (1.0 - share) * full
+            assert free[robot] - paid[robot] == pytest.approx(lost, abs=1e-9)
+            step.append(share)
+            swing[robot, 1 - entered] = motions[-1].clearance[robot, 1 - entered]
+    assert len([share for share in step if 0 < share < 1]) > 5
 
 
 def with_swing_height(height):
     """HOP with another swing height [m] in every guard."""
-    edges = (replace(edge, guard=replace(edge.guard, swing_height=height)) for edge in HOP.edges)
+    edges = (replace(edge, swing_height=height) for edge in HOP.edges)
     return replace(HOP, edges=tuple(edges))

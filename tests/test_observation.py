@@ -280,7 +280,7 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
     for _ in range(steps):
         action = joint_pair(0.8 * action[:robots] + 0.15 * rng.normal(size=(robots, 12)))
         motion = world.step(stance + robot.action_scale * action)
-        state, changed, _ = QUICK_TROT.step(state, motion.contact, motion.clearance, steps_in_state)
+        state, changed, *_ = QUICK_TROT.step(state, motion.contact, steps_in_state)
         steps_in_state = np.where(changed, 0, steps_in_state + 1)
         situation = Situation(
             machine_state=state,

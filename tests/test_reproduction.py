@@ -83,8 +83,8 @@ def test_a_machine_changes_as_often_as_its_lock_out_lets_it(lockout):
     state, waited, changes = np.zeros(1, dtype=int), np.zeros(1, dtype=int), []
     stride = np.array([float(machine.stride())])
     for step in range(100):
-        shown = diagonals[1 - state]  # what the machine waits for, with feet that hardly lift
-        out = machine.step(state, shown, np.zeros((1, 4)), waited, dwell=machine.dwell_for(stride))
+        shown = diagonals[1 - state]  # what the machine waits for
+        out = machine.step(state, shown, waited, dwell=machine.dwell_for(stride))
         state, waited = out.state, np.where(out.changed, 0, waited + 1)
         changes += [step] * int(out.changed[0])
     assert set(np.diff(changes)) == {max(1, lockout)}

@@ -45,10 +45,6 @@ def contacts(*patterns):
     return np.array([[foot in pattern.split() for foot in FEET] for pattern in patterns])
 
 
-def high(rows):
-    return np.full((rows, 4), 0.1)
-
-
 def ints(*values):
     return np.array(values)
 
@@ -60,19 +56,17 @@ def suits(transition, down):
     return set(transition["down"]) <= down and not set(transition["up"]) & down
 
 
-def slow_step(tables, state, down, height, steps, dwell=None, scale=1.0):
-    """(u', changed, bonus) of one robot whose feet `down` touch; height and steps as given."""
+def stance_of(tables, state):
+    return {foot for s in tables["state"] if s["name"] == state for foot in s.get("stance", [])}
+
+
+def slow_step(tables, state, down, steps, dwell=None):
+    """(u', changed, bonus) of one robot whose feet `down` touch, after steps in the state."""
     for one in tables["transition"]:
         asked = Fraction(one.get("dwell", tables["dwell"]))
         if dwell is not None:
             asked = asked * dwell / tables["dwell"] if tables["dwell"] else Fraction(dwell)
-        lift = scale * one.get("swing_height", tables.get("swing_height", 0.0))
-        if (
-            one["from"] == state
-            and suits(one, down)
-            and steps + 1 >= asked
-            and (lift == 0 or all(height[foot] >= lift for foot in one["up"]))
-        ):
+        if one["from"] == state and suits(one, down) and steps + 1 >= asked:
             return one["to"], True, one.get("bonus", 1.0)
     return state, False, 0.0
 
@@ -127,13 +121,13 @@ EXTRAS = st.fixed_dictionaries(
 )
 
 
-def random_labels(tables, rng, steps, robots):
-    """Contacts (T, N, 4), half of them the stance of some state, and clearances [m]."""
+def random_contacts(tables, rng, steps, robots):
+    """Contacts (T, N, 4), half of them the stance of some state."""
     contact = rng.random((steps, robots, 4)) < 0.5
     stances = contacts(*(" ".join(s.get("stance", [])) for s in tables["state"]))
     shown = rng.random((steps, robots)) < 0.5
     contact[shown] = stances[rng.integers(len(stances), size=shown.sum())]
-    return contact, rng.choice([-0.001, 0.0, 0.02, 0.03, 0.04, 0.06], size=(steps, robots, 4))
+    return contact
 
 
 @quick
@@ -141,24 +135,23 @@ def random_labels(tables, rng, steps, robots):
     tables=machines(),
     seed=seeds,
     dwell=st.none() | st.integers(0, 9) | st.lists(st.integers(0, 9), min_size=4, max_size=4),
-    scale=st.sampled_from([0.0, 0.5, 1.0]),
 )
-def test_batched_machine_is_the_slow_machine(tables, seed, dwell, scale):
+def test_batched_machine_is_the_slow_machine(tables, seed, dwell):
     machine = RewardMachine.from_dict(tables)
-    contact, clearance = random_labels(tables, np.random.default_rng(seed), 40, 4)
+    contact = random_contacts(tables, np.random.default_rng(seed), 40, 4)
     names = [state.name for state in machine.states]
     state, steps = np.zeros(4, dtype=int), np.zeros(4, dtype=int)
     command = np.array(dwell) if isinstance(dwell, list) else dwell
     for t in range(len(contact)):
-        told = machine.step(
-            state, contact[t], clearance[t], steps, dwell=command, swing_scale=scale
-        )
+        told = machine.step(state, contact[t], steps, dwell=command)
         for n in range(4):
             down = {foot for foot, touches in zip(FEET, contact[t, n], strict=True) if touches}
-            height = dict(zip(FEET, clearance[t, n], strict=True))
             one = dwell[n] if isinstance(dwell, list) else dwell
-            slow = slow_step(tables, names[state[n]], down, height, steps[n], one, scale)
+            slow = slow_step(tables, names[state[n]], down, steps[n], one)
             assert (names[told.state[n]], told.changed[n], told.bonus[n]) == slow
+            edge = machine.edges[told.edge[n]] if told.edge[n] < len(machine.edges) else None
+            assert (edge is not None) == told.changed[n]
+            assert edge is None or (edge.source, edge.target) == (names[state[n]], slow[0])
         state, steps = told.state, np.where(told.changed, 0, steps + 1)
 
 
@@ -166,10 +159,10 @@ def test_batched_machine_is_the_slow_machine(tables, seed, dwell, scale):
 
 
 def one_step(machine, rng, robots=12):
-    """Arguments of `step` on random labels."""
-    contact, clearance = random_labels(machine.to_dict(), rng, 1, robots)
+    """Arguments of `step` on random contacts."""
+    contact = random_contacts(machine.to_dict(), rng, 1, robots)
     state = rng.integers(len(machine.states), size=robots)
-    return state, contact[0], clearance[0], rng.integers(0, 12, size=robots)
+    return state, contact[0], rng.integers(0, 12, size=robots)
 
 
 @quick
@@ -183,7 +176,7 @@ def test_each_robot_is_its_own(tables, seed):
     order = rng.permutation(len(arguments[0]))
     permuted = machine.step(*(a[order] for a in arguments))
     alone = [machine.step(*(a[n : n + 1] for a in arguments)) for n in range(len(order))]
-    for i in range(3):
+    for i in range(4):
         np.testing.assert_array_equal(permuted[i], together[i][order])
         np.testing.assert_array_equal(np.concatenate([one[i] for one in alone]), together[i])
     for given_array, copy in zip(arguments, before, strict=True):
@@ -194,10 +187,10 @@ def test_each_robot_is_its_own(tables, seed):
 @given(tables=machines(), seed=seeds)
 def test_the_mirrored_machine_sees_mirrored_feet_as_the_machine_sees_them(tables, seed):
     machine = RewardMachine.from_dict(tables)
-    state, contact, clearance, steps = one_step(machine, np.random.default_rng(seed))
+    state, contact, steps = one_step(machine, np.random.default_rng(seed))
     swap = [FEET.index(MIRROR[foot]) for foot in FEET]
-    told = machine.step(state, contact, clearance, steps)
-    mirrored = machine.mirrored().step(state, contact[:, swap], clearance[:, swap], steps)
+    told = machine.step(state, contact, steps)
+    mirrored = machine.mirrored().step(state, contact[:, swap], steps)
     for one, other in zip(told, mirrored, strict=True):
         np.testing.assert_array_equal(one, other)
     assert machine.mirrored().mirrored() == machine
@@ -292,7 +285,7 @@ def test_a_machine_is_not_its_own_mirror_for_its_guards_alone():
 @pytest.mark.parametrize("pattern", [" ".join(sorted(p)) for p in PATTERNS])
 def test_trot_changes_on_the_other_diagonal_alone(pattern):
     trot = RewardMachine.from_dict(TROT)
-    told = trot.step(ints(0, 1), contacts(pattern, pattern), high(2), ints(50, 50))
+    told = trot.step(ints(0, 1), contacts(pattern, pattern), ints(50, 50))
     expected = {"BL FR": [1, 1], "BR FL": [0, 0]}.get(pattern, [0, 1])
     assert told.state.tolist() == expected
     assert told.changed.tolist() == [expected[0] == 1, expected[1] == 0]
@@ -304,7 +297,7 @@ def test_feet_that_tap_at_every_step_change_the_trot_once_a_dwell():
     state, steps, changes = ints(0), ints(0), []
     for t in range(1, 101):
         other = contacts("FR BL" if state[0] == 0 else "FL BR")
-        state, changed, _ = trot.step(state, other, high(1), steps)
+        state, changed, *_ = trot.step(state, other, steps)
         steps = np.where(changed, 0, steps + 1)
         changes += [t] if changed[0] else []
     assert changes == [20, 40, 60, 80, 100]
@@ -318,7 +311,7 @@ def test_dwell_command_takes_the_place_of_the_file_and_keeps_proportions():
     for dwell, first_open in ((None, (19, 9)), (15, (14, 7)), (ints(8, 8, 8, 8), (7, 3))):
         slow, quick_ = first_open
         steps = ints(slow - 1, slow, quick_ - 1, quick_)
-        told = machine.step(states, labels, high(4), steps, dwell=dwell)
+        told = machine.step(states, labels, steps, dwell=dwell)
         assert told.changed.tolist() == [False, True, False, True]
 
 
@@ -369,9 +362,7 @@ def test_feet_that_never_dally_go_once_round_in_a_stride(tables, command):
     assume(edges[-1].target == machine.states[0].name)
     while len(taken) < len(edges) and steps < 1000:
         label = sorted(machine.edges[machine.cycle[len(taken)]].guard.down)
-        told = machine.step(
-            ints(state), contacts(" ".join(label)), high(1), ints(waited), dwell=command
-        )
+        told = machine.step(ints(state), contacts(" ".join(label)), ints(waited), dwell=command)
         state, waited = told.state[0], 0 if told.changed[0] else waited + 1
         taken += [machine.states[state].name] if told.changed[0] else []
         steps += 1
@@ -394,34 +385,46 @@ def test_the_cycle_takes_the_first_way_out_and_ends_where_there_is_none():
     assert round_trip(there, out, back) == ((0, 1), (0, 1, 1, 0))
 
 
-# Feet that are up -------------------------------------------------------------------------------
+# Feet that have swung ---------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    ("clearance", "scale", "changes"),
+    ("swing", "share"),
     [
-        ([0.03, 0.0, 0.0, 0.03], 1.0, True),
-        ([0.0299, 0.0, 0.0, 0.05], 1.0, False),
-        ([0.05, 0.0, 0.0, 0.0299], 1.0, False),
-        ([0.015, 0.0, 0.0, 0.015], 0.5, True),
-        ([0.0149, 0.0, 0.0, 0.03], 0.5, False),
-        ([-0.001, 0.0, 0.0, -0.001], 0.0, True),
-        ([np.nan, 0.0, 0.0, 0.05], 1.0, False),
-        ([0.05, np.nan, np.nan, 0.05], 1.0, True),
+        ([0.0, 0.03, 0.03, 0.0], 1.0),
+        ([0.0, 0.03, 0.015, 0.0], 0.5),
+        ([0.0, 0.01, 0.02, 0.0], 1 / 3),
+        ([9.0, 0.0, 9.0, 9.0], 0.0),
+        ([9.0, 9.0, -0.001, 9.0], 0.0),
+        ([0.0, np.inf, np.inf, 0.0], 1.0),
+        ([np.nan, 0.06, 0.06, np.nan], 1.0),
     ],
 )
-def test_feet_that_are_up_must_be_high_and_no_others(clearance, scale, changes):
+def test_the_lowest_of_the_feet_that_land_is_the_share_of_the_swing_height(swing, share):
     trot = RewardMachine.from_dict(TROT)
-    told = trot.step(ints(0), contacts("FR BL"), np.array([clearance]), ints(30), swing_scale=scale)
-    assert told.changed.tolist() == [changes]
+    told = trot.step(ints(0), contacts("FR BL"), ints(30))
+    assert trot.swing_share(told.edge, np.array([swing])).tolist() == [pytest.approx(share)]
 
 
-@pytest.mark.parametrize("scale", [-0.1, 1.1, np.nan])
-def test_swing_scale_outside_its_range_is_refused(scale):
-    with pytest.raises(ValueError, match=r"swing_scale must be in \[0, 1\]"):
-        RewardMachine.from_dict(TROT).step(
-            ints(0), contacts("FL"), high(1), ints(0), swing_scale=scale
-        )
+def test_no_height_is_asked_for_where_no_foot_lands_or_none_is_told():
+    pronk = [
+        {"from": "ALL", "to": "NONE", "down": [], "up": [*FEET]},
+        {"from": "NONE", "to": "ALL", "down": [*FEET], "up": [], "swing_height": 0.0},
+    ]
+    states = [{"name": "ALL", "stance": [*FEET]}, {"name": "NONE", "stance": []}]
+    machine = RewardMachine.from_dict(TROT | {"state": states, "transition": pronk})
+    assert machine.swing_share(ints(0, 1, 2), np.zeros((3, 4))).tolist() == [1.0, 1.0, 1.0]
+
+
+def test_feet_that_are_expected_stand_now_or_after_the_next_change():
+    gallop = [
+        {"from": name, "to": after, "down": [after], "up": [f for f in FEET if f != after]}
+        for name, after in (("BR", "BL"), ("BL", "FR"), ("FR", "FL"), ("FL", "BR"))
+    ]
+    states = [{"name": one["from"], "stance": [one["from"]]} for one in gallop]
+    machine = RewardMachine.from_dict(TROT | {"state": states, "transition": gallop})
+    expected = machine.expected(np.arange(4))
+    np.testing.assert_array_equal(expected, contacts("BR BL", "BL FR", "FR FL", "FL BR"))
 
 
 def test_entering_takes_the_stance_most_feet_agree_with_and_the_first_of_equals():
@@ -443,11 +446,11 @@ def test_an_accepting_state_is_never_entered_left_or_shown():
     flight = contacts("")
     assert machine.enter(contacts("", "FL FR BL BR")).tolist() == [0, 0]
     assert not machine.shows_stance(flight)[0]
-    assert machine.step(ints(1), flight, high(1), ints(30)).state.tolist() == [2]
+    assert machine.step(ints(1), flight, ints(30)).state.tolist() == [2]
     for pattern in PATTERNS:
         label = contacts(" ".join(pattern))
         assert not machine.shows_state(ints(2), label)[0]
-        assert not machine.step(ints(2), label, high(1), ints(30)).changed[0]
+        assert not machine.step(ints(2), label, ints(30)).changed[0]
 
 
 # Faults -----------------------------------------------------------------------------------------
@@ -584,7 +587,7 @@ def test_two_states_may_be_joined_by_guards_that_exclude_each_other():
     loose = {"from": "FL_BR", "to": "FR_BL", "down": ["FR", "BL", "FL"], "up": [], "dwell": 30}
     machine = RewardMachine.from_dict(edited(transition=[*TROT["transition"], loose]))
     label = contacts("FR BL", "FR BL FL", "FR BL FL", "FR BL BR")
-    told = machine.step(ints(0, 0, 0, 0), label, high(4), ints(20, 20, 30, 30))
+    told = machine.step(ints(0, 0, 0, 0), label, ints(20, 20, 30, 30))
     assert told.changed.tolist() == [True, False, True, False]
 
 
@@ -678,7 +681,7 @@ def test_mermaid_tells_every_state_and_every_edge_once(tables):
 
 
 def test_mermaid_of_trot_tells_the_guard():
-    guard = "FL_BR --> FR_BL : FR BL down, FL BR up by 3 cm, after 20 steps"
+    guard = "FL_BR --> FR_BL : FR BL down, FL BR up, after 20 steps"
     assert guard in mermaid(RewardMachine.from_dict(TROT))
 
 

@@ -62,7 +62,7 @@ class RewardConfig:
     power: float = -0.015
     """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
     chatter: float = -30.0
-    """Times the feet that come down again before the machine has lifted them again, and the
+    """Times the feet that come down out of place (twice in a swing, or states too early), and the
     environment's strictness; ours: one touchdown a swing is clean, and free at any frequency."""
     action_rate: float = -0.02
     """Times ‖a - a_last‖²; ours: smooth targets."""
@@ -103,7 +103,7 @@ def walk_reward(
         command: what was asked for.
         stance: q_init [rad].
         agreement: share of the feet that are as the stance of the machine's state has them.
-        chatter: number of feet that came down a second time, times the present strictness.
+        chatter: number of feet that came down out of place, times the present strictness.
         action_change: action minus the action before it.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from gaitshift.command import ACTION_LIMIT, CONTROL_PERIOD, Command
 from gaitshift.env.config import EnvConfig
+from gaitshift.env.swings import Swings
 from gaitshift.motion import Motion
 from gaitshift.observation import Observation, Situation
 from gaitshift.reward import walk_reward, with_bonus
@@ -51,8 +52,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.observe = Observation(machine, self.config.observed)
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
         self.strictness = 1.0
-        """How much of what only a clean gait can give is asked for now, 0 to 1: factor on the swing
-        heights of the machine's guards and on the price of chatter."""
+        """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
+        depends on the height of the swing, and factor on the price of chatter."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.penalty_scale = 1.0
@@ -89,18 +90,15 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         self.world.push(self._pusher.step())
         motion = self.world.step(self._stance + self.robot.action_scale * action)
-        chatter = self._chatter(motion)
-        left = self._state
-        self._state, changed, bonus = self.machine.step(
-            left,
+        step = self.machine.step(
+            self._state,
             motion.contact,
-            motion.clearance,
             self._steps_in_state,
             dwell=self.machine.dwell_for(self._command.stride),
-            swing_scale=self.strictness,
         )
-        self._steps_in_state = np.where(changed, 0, self._steps_in_state + 1)
-        self._may_land |= self.machine.lifted(left, self._state)
+        chatter, swing_share = self._swings.see(self._state, step, motion)
+        self._state = step.state
+        self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
         agreement = self.machine.agreement(self._state, motion.contact)
         terms = walk_reward(
             self.config.reward,
@@ -112,12 +110,13 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             action_change=action - self._last_action,
             penalty_scale=self.penalty_scale,
         )
+        bonus = step.bonus * (1.0 - self.strictness * (1.0 - swing_share))
         reward = with_bonus(self.config.reward, np.sum(list(terms.values()), axis=0), bonus)
         self._last_action = action
         self._age += 1
         info = {
             "reward_terms": terms,
-            "changed": changed,
+            "changed": step.changed,
             "shows_stance": agreement == 1.0,
             "forward_speed": motion.base_linear_velocity_b[:, 0],
         }
@@ -149,10 +148,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._pusher = Pusher(self.config.push, n, rng)
         self._state: Int[np.ndarray, " N"] = np.full(n, self.machine.initial)
         self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._swings = Swings(self.machine, n)
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
-        self._stood: Bool[np.ndarray, "N 4"] = np.zeros((n, 4), dtype=bool)
-        self._may_land: Bool[np.ndarray, "N 4"] = np.ones((n, 4), dtype=bool)
         self._line: Float[np.ndarray, " N"] = np.zeros(n)
         self._heading: Float[np.ndarray, " N"] = np.zeros(n)
         self._command = self._own_command(n)
@@ -183,21 +181,12 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._pusher.clear(ids)
         self._state[ids] = self.machine.initial
         self._steps_in_state[ids] = 0
+        self._swings.restart(ids)
         self._age[ids] = 0
         self._last_action[ids] = 0.0
-        self._stood[ids] = False
-        self._may_land[ids] = True
         self._line[ids] = self._heading[ids] = yaw
         self._draw_commands(ids)
         self._update_command()
-
-    def _chatter(self, motion: Motion) -> Int[np.ndarray, " N"]:
-        """How many feet of each robot come down again before the machine has lifted them."""
-        lands = motion.contact & ~self._stood
-        again = lands & ~self._may_land
-        self._may_land &= ~lands
-        self._stood = motion.contact.copy()
-        return again.sum(axis=1)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:

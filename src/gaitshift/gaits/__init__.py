@@ -4,8 +4,9 @@ Gaits are data: a new file here is a new gait, and `load` takes any other file b
 is checked when it is read, never run. It holds
 
 - `name`, `title`, `description`: short name, name for people, what the gait is;
-- `dwell` [control steps] and `swing_height` [m, 0 if left out]: what a transition asks for that
-  names no other;
+- `dwell` [control steps], what a transition asks for that names no other, and `swing_height` [m, 0
+  if left out], up to which height of the swing a transition that names no other pays its bonus in
+  part;
 - `dwell_range` [control steps]: least and greatest dwell that may be commanded, by way of the
   stride frequency; transitions that name their own keep their proportion. `dwell` alone if left
   out;

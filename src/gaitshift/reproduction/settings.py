@@ -36,7 +36,7 @@ class Setting:
         """The gait's machine with this lock-out, and feet lifted as low as they like."""
         own = gaits.load(gait)
         edges = tuple(
-            replace(edge, guard=replace(edge.guard, dwell=self.lockout, swing_height=0.0))
+            replace(edge, guard=replace(edge.guard, dwell=self.lockout), swing_height=0.0)
             for edge in own.edges
         )
         return replace(

@@ -8,6 +8,9 @@ from gaitshift.reward_machine.feet import in_leg_order, mirrored_name
 from gaitshift.reward_machine.guard import Guard
 from gaitshift.reward_machine.reading import Table, located
 
+MOST_SWING_HEIGHT = 0.3
+"""Greatest swing height a file may ask for [m]. Ours: half of ANYmal's leg."""
+
 _KEYS = ("from", "to", "down", "up", "dwell", "swing_height", "bonus")
 
 
@@ -27,6 +30,11 @@ class Edge:
     bonus: float = 1.0
     """δr of the edge, as a multiplier of the bonus b that all edges share (paper III-C: 200)."""
 
+    swing_height: float = 0.0
+    """Height [m] over the ground that the soles of the feet that come down should have reached in
+    their swing; 0: any. It bars no edge: a lower swing is paid a smaller bonus. Ours, with the
+    3 cm of RMLL in mind: without it feet drag."""
+
     def __post_init__(self):
         if self.source == self.target:
             raise GaitshiftError(
@@ -34,6 +42,7 @@ class Edge:
             )
         if not math.isfinite(self.bonus):
             raise GaitshiftError(f"bonus must be a finite number, not {self.bonus}")
+        check_swing_height(self.swing_height)
 
     def mirrored(self) -> "Edge":
         """Return the edge of the robot seen in a mirror."""
@@ -42,6 +51,7 @@ class Edge:
             target=mirrored_name(self.target),
             guard=self.guard.mirrored(),
             bonus=self.bonus,
+            swing_height=self.swing_height,
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -52,7 +62,7 @@ class Edge:
             "down": in_leg_order(self.guard.down),
             "up": in_leg_order(self.guard.up),
             "dwell": self.guard.dwell,
-            "swing_height": self.guard.swing_height,
+            "swing_height": self.swing_height,
             "bonus": self.bonus,
         }
 
@@ -71,7 +81,17 @@ class Edge:
                 down=table.feet("down"),
                 up=table.feet("up"),
                 dwell=table.whole("dwell", default=dwell),
+            )
+            return cls(
+                source=source,
+                target=target,
+                guard=guard,
+                bonus=table.number("bonus", default=1.0),
                 swing_height=table.number("swing_height", default=swing_height),
             )
-            bonus = table.number("bonus", default=1.0)
-            return cls(source=source, target=target, guard=guard, bonus=bonus)
+
+
+def check_swing_height(height: float) -> None:
+    """Refuse a negative or absurd swing height [m], with a `GaitshiftError`."""
+    if not 0 <= height <= MOST_SWING_HEIGHT:
+        raise GaitshiftError(f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, not {height:g}")

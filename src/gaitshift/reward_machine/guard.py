@@ -1,4 +1,4 @@
-"""When an edge may be taken: feet down, feet up and high enough, long enough in the state."""
+"""When an edge may be taken: feet down, feet up, long enough in the state."""
 
 from dataclasses import dataclass
 
@@ -16,16 +16,13 @@ from gaitshift.reward_machine.feet import (
 MOST_DWELL = 1000
 """Longest dwell a file may ask for [control steps]: 10 s at the paper's 100 Hz. Ours."""
 
-MOST_SWING_HEIGHT = 0.3
-"""Greatest swing height a file may ask for [m]. Ours: half of ANYmal's leg."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Guard:
-    """The condition of an edge on the contacts (paper III-C), on time and on the lifted feet.
+    """The condition of an edge on the contacts (paper III-C) and on time.
 
-    The contacts are the paper's. Dwell and swing height are ours, after the lock-out of the first
-    author's earlier code and the 3 cm of RMLL: without them the feet learn to vibrate.
+    The contacts are the paper's. The dwell is ours, after the lock-out of the first author's
+    earlier code: without it the feet learn to vibrate.
     """
 
     down: Feet
@@ -37,15 +34,11 @@ class Guard:
     dwell: int = 0
     """Least number of control steps in the source state, the present one counted; 0 and 1: any."""
 
-    swing_height: float = 0.0
-    """Least height [m] of the sole of every `up` foot over the ground under it; 0: any."""
-
     def __post_init__(self):
         check_feet(self.down | self.up)
         if both := self.down & self.up:
             raise GaitshiftError(f"{feet_text(both)} cannot be both down and up")
         check_dwell(self.dwell)
-        check_swing_height(self.swing_height)
 
     def holds_in(self, feet: Feet) -> bool:
         """Whether the contacts suit the guard when these feet alone touch."""
@@ -68,14 +61,12 @@ class Guard:
             down=mirrored_feet(self.down),
             up=mirrored_feet(self.up),
             dwell=self.dwell,
-            swing_height=self.swing_height,
         )
 
     def demands(self) -> list[str]:
         """List what the guard asks for, for people."""
-        height = f" by {100 * self.swing_height:g} cm" if self.swing_height and self.up else ""
         lines = [f"{feet_text(self.down)} down"] if self.down else []
-        lines += [f"{feet_text(self.up)} up{height}"] if self.up else []
+        lines += [f"{feet_text(self.up)} up"] if self.up else []
         return lines + ([f"after {self.dwell} steps"] if self.dwell > 1 else [])
 
 
@@ -83,9 +74,3 @@ def check_dwell(dwell: int) -> None:
     """Refuse a negative or absurd dwell, with a `GaitshiftError`."""
     if not 0 <= dwell <= MOST_DWELL:
         raise GaitshiftError(f"dwell must be 0 to {MOST_DWELL} control steps, not {dwell}")
-
-
-def check_swing_height(height: float) -> None:
-    """Refuse a negative or absurd swing height [m], with a `GaitshiftError`."""
-    if not 0 <= height <= MOST_SWING_HEIGHT:
-        raise GaitshiftError(f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, not {height:g}")

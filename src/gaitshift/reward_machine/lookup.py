@@ -22,9 +22,6 @@ class Lookup:
     edge: Int[np.ndarray, " states_x_16"]
     """Edge that suits state u and label l, at index 16 u + l."""
 
-    exists: Bool[np.ndarray, " rows"]
-    """False in the last row only."""
-
     target: Int[np.ndarray, " rows"]
     """State the edge leads to."""
 
@@ -41,10 +38,11 @@ class Lookup:
     """Shortest dwell of the edges out of each state over the machine's own; 0 where none is."""
 
     swing_height: Float[np.ndarray, " rows"]
-    """Least height of the up feet [m]."""
+    """Height that the landing feet should have reached [m]."""
 
-    up: Bool[np.ndarray, "rows 4"]
-    """Feet whose height counts."""
+    landing: Bool[np.ndarray, "rows 4"]
+    """Feet that swing up to the edge: down in its guard, not in the stance of its source. None
+    where no height is asked for."""
 
     bonus: Float[np.ndarray, " rows"]
     """Multiplier of the shared bonus; 0 in the last row."""
@@ -54,6 +52,9 @@ class Lookup:
 
     down: Bool[np.ndarray, "states 4"]
     """Feet down in each state's stance; none for an accepting state."""
+
+    expected: Bool[np.ndarray, "states 4"]
+    """Feet down in the stance of each state or of one that follows it."""
 
     is_stance: Bool[np.ndarray, " 16"]
     """Whether a contact label is the stance of any state."""
@@ -72,11 +73,18 @@ class Lookup:
         for e, edge in enumerate(edges):
             suits[index[edge.source], list(edge.guard.labels)] = e
         dwells = np.array([edge.guard.dwell for edge in edges] + [0])
-        up = [[leg in edge.guard.up for leg in LEGS] for edge in edges]
+        stands = {state.name: state.stance for state in states}
+        landing = [
+            [edge.swing_height > 0 and leg in edge.guard.down - stands[edge.source] for leg in LEGS]
+            for edge in edges
+        ]
+        down = np.array([[leg in state.stance for leg in LEGS] for state in states])
+        expected = down.copy()
+        for edge in edges:
+            expected[index[edge.source]] |= down[index[edge.target]]
         stance = np.array([-1 if s.accepting else feet_label(s.stance) for s in states])
         return cls(
             edge=suits.ravel(),
-            exists=np.arange(len(edges) + 1) < len(edges),
             target=np.array([index[edge.target] for edge in edges] + [0]),
             dwell=dwells,
             dwell_share=dwells if dwell else np.ones_like(dwells),
@@ -88,11 +96,12 @@ class Lookup:
                     for s in states
                 ]
             ),
-            swing_height=np.array([edge.guard.swing_height for edge in edges] + [0.0]),
-            up=np.array([*up, [False] * len(LEGS)]),
+            swing_height=np.array([edge.swing_height for edge in edges] + [0.0]),
+            landing=np.array([*landing, [False] * len(LEGS)]),
             bonus=np.array([edge.bonus for edge in edges] + [0.0]),
             stance=stance,
-            down=np.array([[leg in s.stance for leg in LEGS] for s in states]),
+            down=down,
+            expected=expected,
             is_stance=np.isin(np.arange(LABEL_COUNT), stance),
             agreement=_agreement(stance).ravel(),
             fitting_state=_agreement(stance).argmax(axis=0),

@@ -13,8 +13,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.legs import LABEL_COUNT, LEGS, MIRRORED_LEGS, label_of
 from gaitshift.reward_machine.check import check
 from gaitshift.reward_machine.cycle import cycle, shares, stride, touchdowns
-from gaitshift.reward_machine.edge import Edge
-from gaitshift.reward_machine.guard import check_dwell, check_swing_height
+from gaitshift.reward_machine.edge import Edge, check_swing_height
+from gaitshift.reward_machine.guard import check_dwell
 from gaitshift.reward_machine.lookup import Lookup
 from gaitshift.reward_machine.mirror import mirrored_states
 from gaitshift.reward_machine.reading import Table, located
@@ -44,6 +44,9 @@ class Step(NamedTuple):
 
     changed: Bool[np.ndarray, " N"]
     """Whether it came there by an edge in this step."""
+
+    edge: Int[np.ndarray, " N"]
+    """Number of that edge in `edges`, the number of all edges where there was none."""
 
     bonus: Float[np.ndarray, " N"]
     """Multiplier of the shared bonus: δr of the edge where changed, 0 elsewhere."""
@@ -123,43 +126,50 @@ class RewardMachine:
         self,
         state: Int[np.ndarray, " N"],
         contact: Bool[np.ndarray, "N 4"],
-        clearance: Float[np.ndarray, "N 4"],
         steps_in_state: Int[np.ndarray, " N"],
         *,
         dwell: int | Int[np.ndarray, " N"] | None = None,
-        swing_scale: float = 1.0,
     ) -> Step:
         """δu and δr of N machines on the labels of this control step; nothing given is changed.
 
         Args:
             state: u, in which the policy acted.
             contact: whether each foot touches at the end of the step, the label L(s, a, s').
-            clearance: height [m] of each foot's sole over the ground under it.
             steps_in_state: δ that the policy saw, the steps since the last change: 0 in the step
                 that follows a change, and the step now ending counts. So an edge opens when
                 steps_in_state + 1 reaches its dwell, and two changes are at least a dwell apart.
             dwell: a gait-frequency command [control steps], in place of the machine's own dwell;
                 an edge that names its own keeps its proportion to it, rounded up.
-            swing_scale: in [0, 1], factor on every swing height, so that training can raise the
-                feet by and by; at 0 no height is asked for.
         """
-        if not 0 <= swing_scale <= 1:
-            raise ValueError(f"swing_scale must be in [0, 1], not {swing_scale}")
         rows = self._lookup
-        edge = rows.edge[state * LABEL_COUNT + label_of(contact)]
+        suiting = rows.edge[state * LABEL_COUNT + label_of(contact)]
         waited = steps_in_state + 1
         if dwell is None:
-            waited_enough = waited >= rows.dwell[edge]
+            waited_enough = waited >= rows.dwell[suiting]
         else:
-            waited_enough = waited * rows.dwell_parts >= rows.dwell_share[edge] * dwell
-        height = rows.swing_height[edge] * swing_scale
-        low = rows.up[edge] & (height > 0)[:, None] & ~(clearance >= height[:, None])
-        changed = rows.exists[edge] & waited_enough & ~low.any(axis=1)
+            waited_enough = waited * rows.dwell_parts >= rows.dwell_share[suiting] * dwell
+        edge = np.where(waited_enough, suiting, len(self.edges))
+        changed = edge < len(self.edges)
         return Step(
             state=np.where(changed, rows.target[edge], state),
             changed=changed,
-            bonus=np.where(changed, rows.bonus[edge], 0.0),
+            edge=edge,
+            bonus=rows.bonus[edge],
         )
+
+    def swing_share(
+        self, edge: Int[np.ndarray, " N"], swing: Float[np.ndarray, "N 4"]
+    ) -> Float[np.ndarray, " N"]:
+        """How much of an edge's swing height its feet have reached, in [0, 1]: the lowest counts.
+
+        Args:
+            edge: as `step` gives it; 1 where there was none.
+            swing: greatest clearance [m] of each foot since the machine lifted it.
+        """
+        rows = self._lookup
+        height = rows.swing_height[edge]
+        share = np.clip(swing / np.where(height > 0, height, 1.0)[:, None], 0.0, 1.0)
+        return np.where(rows.landing[edge], share, 1.0).min(axis=1)
 
     def lifted(
         self, left: Int[np.ndarray, " N"], entered: Int[np.ndarray, " N"]
@@ -167,6 +177,10 @@ class RewardMachine:
         """Feet that stand in the stance of the state left and not in that of the state entered."""
         stance = self._lookup.down
         return stance[left] & ~stance[entered]
+
+    def expected(self, state: Int[np.ndarray, " N"]) -> Bool[np.ndarray, "N 4"]:
+        """Feet whose touchdown is in place: those in the stance of the state or of the next one."""
+        return self._lookup.expected[state]
 
     def wait(
         self,

@@ -39,7 +39,7 @@ def draw(machine: RewardMachine, path: Path) -> None:
     """Draw the machine into a PNG, SVG or PDF file, on white.
 
     Each state is a card with the robot seen from above, nose up, filled feet down. Each arrow
-    tells the feet down, the feet up and their least height, and the dwell [control steps].
+    tells the feet down, the feet up and the dwell [control steps].
     Raises `GaitshiftError` for another file ending or a folder that is not there.
     """
     if path.suffix.lower() not in FORMATS:
@@ -202,9 +202,8 @@ def _draw_guard(axes: "Axes", edge: Edge, middle: tuple[float, float]) -> None:
     from matplotlib.offsetbox import AnnotationBbox, TextArea, VPacker
 
     guard = edge.guard
-    height = f" ≥ {100 * guard.swing_height:g} cm" if guard.swing_height else ""
     lines = [(f"● {feet_text(guard.down)}", _DOWN)] if guard.down else []
-    lines += [(f"○ {feet_text(guard.up)}{height}", _UP)] if guard.up else []
+    lines += [(f"○ {feet_text(guard.up)}", _UP)] if guard.up else []
     lines += [(f"≥ {guard.dwell} steps", _QUIET)] if guard.dwell > 1 else []
     areas = [TextArea(text, textprops={"color": colour, "size": 9}) for text, colour in lines]
     packed = VPacker(children=[*areas], align="center", pad=0, sep=3)

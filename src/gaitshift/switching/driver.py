@@ -50,15 +50,14 @@ class Driver:
         """
         stride = command.stride
         for index, ids in self._groups():
-            state, changed, _ = self._machines[index].step(
+            step = self._machines[index].step(
                 self.machine_state[ids],
                 motion.contact[ids],
-                motion.clearance[ids],
                 self.steps_in_state[ids],
                 dwell=self._machines[index].dwell_for(stride[ids]),
             )
-            self.machine_state[ids] = state
-            self.steps_in_state[ids] = np.where(changed, 0, self.steps_in_state[ids] + 1)
+            self.machine_state[ids] = step.state
+            self.steps_in_state[ids] = np.where(step.changed, 0, self.steps_in_state[ids] + 1)
 
     def switch(self, ids: Int[np.ndarray, " K"], gait: str, motion: Motion) -> None:
         """Robots `ids` take up another gait at once; those already in it are left alone."""
