@@ -9,7 +9,14 @@ import tyro
 from gaitshift import policy as policies
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import SIZES, EvaluationConfig, evaluate, run_trials
+from gaitshift.evaluation import (
+    SIZES,
+    EvaluationConfig,
+    Followed,
+    evaluate,
+    follow_commands,
+    run_trials,
+)
 from gaitshift.evaluation.trials import Row
 from gaitshift.log import Log
 
@@ -41,6 +48,9 @@ class Evaluate(EvaluationConfig):
     trials: Literal["all", "short", "quick"] | None = None
     """Run the standard trials instead, each figure against its limit: all (1000 pushed episodes,
     then 256 of 20 s on each ground), short (a quarter of each), or quick ones for a first look."""
+    commands: bool = False
+    """Instead ask for speeds and stride frequencies over their ranges, on flat ground, and tell
+    what comes of them."""
     json: bool = False
     """One JSON object on stdout."""
     log: Path | None = None
@@ -54,6 +64,9 @@ class Evaluate(EvaluationConfig):
         """Evaluates, prints and draws."""
         self._check_files()
         loaded = policies.load(self.policy)
+        if self.commands:
+            self._command(loaded)
+            return
         if self.trials is None:
             figures, log = self._evaluate(loaded)
         else:
@@ -104,6 +117,15 @@ class Evaluate(EvaluationConfig):
             emit_table(title, [_trial_row(row) for row in rows])
         return figures, log
 
+    def _command(self, loaded: policies.Policy) -> None:
+        with progress(f"commands of {loaded.gait}") as report:
+            rows = follow_commands(loaded, self.seed, report)
+        if self.json:
+            kept = [asdict(row) for row in rows]
+            emit_json({"policy": str(loaded.path), "gait": loaded.gait, "commands": kept})
+        else:
+            emit_table(f"{loaded.gait}, what is asked for and what comes of it", _followed(rows))
+
     def _config(self) -> EvaluationConfig:
         names = EvaluationConfig.__dataclass_fields__
         return EvaluationConfig(**{name: getattr(self, name) for name in names})
@@ -117,12 +139,15 @@ class Evaluate(EvaluationConfig):
             from gaitshift.plots.style import check_target
 
             check_target(self.plot)
-        if self.trials is None:
+        if self.trials is None and not self.commands:
             return
+        mode = "--commands" if self.commands else "--trials"
+        if self.commands and (self.trials or self.log or self.plot):
+            raise GaitshiftError("--commands stands alone: no --trials, --log or --plot")
         for field in fields(EvaluationConfig):
             if field.name != "seed" and getattr(self, field.name) != field.default:
                 option = field.name.replace("_", "-")
-                raise GaitshiftError(f"--trials has grounds and lengths of its own: no --{option}")
+                raise GaitshiftError(f"{mode} has grounds and lengths of its own: no --{option}")
 
 
 def _figure_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
@@ -138,6 +163,20 @@ def _figure_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
         limit = f"{side.replace('_', ' ')} {miss[side]:g}"
         rows.append((f"  misses {miss['figure']}{foot}", f"{_text(miss['value'], '')}, {limit}"))
     return rows
+
+
+def _followed(rows: list[Followed]) -> list[tuple[str, ...]]:
+    head = ("asked", "speed", "cycles", "pattern", "survival")
+    return [head] + [
+        (
+            f"{row.forward_speed:.2f} m/s, {row.stride_frequency:.2f} Hz",
+            _text(row.speed_mean, "m/s"),
+            _text(row.cycles_per_s, "Hz"),
+            _text(row.pattern_fraction, ""),
+            _text(row.survival, ""),
+        )
+        for row in rows
+    ]
 
 
 def _trial_row(row: Row) -> tuple[str, ...]:

@@ -1,5 +1,7 @@
 """Runs trained robots many at a time: rollouts, evaluations, the demonstration."""
 
+from gaitshift.evaluation.commands import Followed as Followed
+from gaitshift.evaluation.commands import follow_commands as follow_commands
 from gaitshift.evaluation.demo import DemoConfig as DemoConfig
 from gaitshift.evaluation.demo import run_demo as run_demo
 from gaitshift.evaluation.demo import summarise as summarise
