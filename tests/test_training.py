@@ -145,6 +145,7 @@ def test_the_paper_preset_has_the_papers_figures():
         {"strict_from": -1},
         {"command_from": 5, "command_until": 5},
         {"command_from": -1},
+        {"settle": 1.5},
         {"stages": ()},
         {"stages": (Stage(name="flat", iterations=0),)},
         {"stages": (Stage(name="flat", iterations=5), Stage(name="rough", iterations=-1))},
@@ -195,6 +196,13 @@ def test_commands_spread_in_a_straight_line_and_go_by_no_other_schedule():
     recipe = replace(TINY, command_from=8, command_until=16, strict_from=100, strict_until=101)
     table = {0: 0.0, 8: 0.0, 9: 0.125, 12: 0.5, 16: 1.0, 17: 1.0, 1000: 1.0}
     assert {i: recipe.command_scale(i) for i in table} == table
+
+
+def test_a_policy_settles_in_the_last_part_of_its_iterations():
+    recipe = replace(ABC.with_iterations(100), settle=0.4)
+    table = {0: 1.0, 60: 1.0, 70: 0.775, 80: 0.55, 100: 0.1}
+    assert {i: pytest.approx(recipe.settling(i)) for i in table} == table
+    assert replace(recipe, settle=0.0).settling(100) == 1.0
 
 
 # Grounds ----------------------------------------------------------------------------------------
@@ -311,13 +319,13 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
     figures = {"iteration", "stage", "steps", "wall_s", "reward", "speed", "changes_per_s"}
     figures |= {"stance_fraction", "survival", "value_loss", "action_std", "learning_rate"}
     weights = {field.name for field in fields(RewardConfig)}
-    terms = weights - {"bonus", "bonus_mode"}
+    terms = weights - {"bonus_mode"}
     assert set(reported[0]) == figures | {f"reward/{name}" for name in terms}
     for row in reported:
         assert all(np.isfinite(value) for name, value in row.items() if name != "stage")
-        bonus = row["changes_per_s"] / 100 * run.recipe.env.reward.bonus
-        walk = sum(row[f"reward/{name}"] for name in terms)
-        assert row["reward"] == pytest.approx(walk + bonus, abs=1e-3)
+        assert row["reward"] == pytest.approx(sum(row[f"reward/{n}"] for n in terms), abs=1e-3)
+        most = row["changes_per_s"] / 100 * run.recipe.env.reward.bonus
+        assert 0 <= row["reward/bonus"] <= most + 1e-3, "a low swing is paid in part"
 
 
 def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
@@ -328,6 +336,10 @@ def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
         np.testing.assert_array_equal(ground.height, expected.height)
     assert run.learner.env.config.push.force == 100.0
     assert run.learner.env.strictness == run.learner.env.command_scale == 1.0
+    settled = run.recipe.settling(run.recipe.iterations - 1)
+    assert settled < 1.0
+    assert run.learner.ppo.entropy_coef == settled * run.recipe.ppo.entropy
+    assert run.learner.ppo.desired_kl == settled * run.recipe.ppo.desired_kl
 
 
 def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(whole):
@@ -629,7 +641,7 @@ class Toss(GaitEnv):
     def step(self, actions):
         ended = self.rng.random(32) < self.chance
         none = np.zeros(32, dtype=bool)
-        info = {"reward_terms": {}, "changed": none, "shows_stance": none}
+        info = {"reward_terms": {}, "bonus": none, "changed": none, "shows_stance": none}
         info |= {"forward_speed": np.zeros(32), "final_obs": self.noise(), "_final_obs": ended}
         return self.noise(), np.ones(32), ended, none, info
 
@@ -673,7 +685,7 @@ class Entrance(GaitEnv):
         final = self.look()
         self.in_b = ~cut
         none = np.zeros(32, dtype=bool)
-        info = {"reward_terms": {}, "changed": none, "shows_stance": none}
+        info = {"reward_terms": {}, "bonus": none, "changed": none, "shows_stance": none}
         info |= {"forward_speed": np.zeros(32), "final_obs": final, "_final_obs": cut}
         return self.look(), reward, none, cut, info
 

@@ -11,6 +11,7 @@ from gaitshift import gaits, policy
 from gaitshift.cli import main
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.evaluation import SIZES, run_trials
+from gaitshift.evaluation import commands as commands_module
 from gaitshift.evaluation import trials as trials_module
 from gaitshift.evaluation.trials import TRIALS, Row, Size, lateral_errors
 from gaitshift.terrain import flat, from_spec
@@ -142,10 +143,34 @@ def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys
     assert "speed_error [m/s]" in table
 
 
+def test_commands_are_asked_for_over_their_ranges_and_what_comes_of_them_is_told(
+    tmp_path, capsys, monkeypatch
+):
+    monkeypatch.setattr(commands_module, "ROBOTS", 2)
+    monkeypatch.setattr(commands_module, "SECONDS", 2.5)
+    main(["evaluate", "trot", "--commands", "--json"])
+    rows = json.loads(capsys.readouterr().out)["commands"]
+    info = policy.load("trot").info
+    assert len(rows) == 10
+    own = (info.forward_speed, info.stride_frequency)
+    assert [row["stride_frequency"] for row in rows[:5]] == [own[1]] * 5
+    assert [row["forward_speed"] for row in rows[5:]] == [own[0]] * 5
+    assert [rows[0]["forward_speed"], rows[4]["forward_speed"]] == info.speed_range
+    ends = [rows[5]["stride_frequency"], rows[9]["stride_frequency"]]
+    assert ends == pytest.approx(info.stride_frequency_range)
+    speeds = [row["speed_mean"] for row in rows[:5]]
+    assert speeds == sorted(speeds), "who is asked to go faster goes faster"
+    assert rows[9]["cycles_per_s"] > rows[5]["cycles_per_s"] + 0.5
+    main(["evaluate", "trot", "--commands"])
+    assert "1.60 m/s, 2.50 Hz" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
         (["--trials", "quick", "--terrain", "slope:10"], "no --terrain"),
+        (["--commands", "--seconds", "3"], "no --seconds"),
+        (["--commands", "--plot", "walk.png"], "no --trials, --log or --plot"),
         (["--plot", "walk.gif"], "walk.gif: the name of a figure ends in"),
     ],
 )

@@ -31,8 +31,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     `episode_steps` or at the border of the terrain. Robots restart in the same step
     (`AutoresetMode.SAME_STEP`); the observation that ended an episode is in `info["final_obs"]`,
     where `info["_final_obs"]` holds.
-    `info["reward_terms"]` has each weighted term of the reward, `info["changed"]` says where the
-    machine changed its state.
+    `info["reward_terms"]` has each weighted term of R_walk, `info["bonus"]` what the machine added,
+    `info["changed"]` says where it changed its state.
     """
 
     def __init__(
@@ -111,11 +111,13 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             penalty_scale=self.penalty_scale,
         )
         bonus = step.bonus * (1.0 - self.strictness * (1.0 - swing_share))
-        reward = with_bonus(self.config.reward, np.sum(list(terms.values()), axis=0), bonus)
+        walk = np.sum(list(terms.values()), axis=0)
+        reward = with_bonus(self.config.reward, walk, bonus)
         self._last_action = action
         self._age += 1
         info = {
             "reward_terms": terms,
+            "bonus": reward - walk,
             "changed": step.changed,
             "shows_stance": agreement == 1.0,
             "forward_speed": motion.base_linear_velocity_b[:, 0],

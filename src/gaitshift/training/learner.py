@@ -55,6 +55,11 @@ class Learner:
             "learning_rate": self.ppo.learning_rate,
         }
 
+    def settle(self, factor: float) -> None:
+        """Sets the divergence that updates aim at, and the entropy bonus, to a part of theirs."""
+        self.ppo.desired_kl = factor * self.recipe.ppo.desired_kl
+        self.ppo.entropy_coef = factor * self.recipe.ppo.entropy
+
     def _collect(self, statistics: "_Statistics") -> None:
         ppo, scale = self.ppo, self.recipe.ppo.reward_scale
         action = ppo.act(self._observation)
@@ -87,6 +92,7 @@ class _Statistics:
         """Takes in one step of all robots."""
         seen = {
             "reward": reward,
+            "reward/bonus": info["bonus"],
             "speed": info["forward_speed"],
             "falls": terminated,
             "changes_per_s": info["changed"] / CONTROL_PERIOD,

@@ -111,6 +111,10 @@ class Recipe:
     """The factor λ on all penalties at the first iteration; 1: no curriculum (paper III-D)."""
     penalty_until: int = 200
     """Iteration at which λ has grown to 1, by the same step each iteration."""
+    settle: float = 0.25
+    """Last share of the iterations, in which the policy settles: `desired_kl` and `entropy` fall to
+    a tenth; ours: without it the speed of the last policy is off by up to 0.07 m/s, now to this
+    side, now to that."""
     checkpoint_every: int = 50
     """Iterations between two checkpoints."""
     threads: int = 2
@@ -127,6 +131,7 @@ class Recipe:
             ("physics_threads", 0, 1024),
             ("penalty_start", 0.0, 1.0),
             ("penalty_until", 1, 1_000_000),
+            ("settle", 0.0, 1.0),
         ):
             value = getattr(self, name)
             if not low <= value <= high:
@@ -167,6 +172,13 @@ class Recipe:
         first = self.penalty_start
         return first + (1.0 - first) * _grown(iteration, 0, self.penalty_until)
 
+    def settling(self, iteration: int) -> float:
+        """The factor on `desired_kl` and `entropy` at this iteration."""
+        if self.settle == 0:
+            return 1.0
+        start = (1.0 - self.settle) * self.iterations
+        return 1.0 - 0.9 * _grown(iteration, start, self.iterations)
+
     @classmethod
     def paper(cls) -> "Recipe":
         """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
@@ -191,10 +203,11 @@ class Recipe:
             robots=30,
             steps=100,
             strict_share=0.0,
+            settle=0.0,
         )
 
 
-def _grown(iteration: int, start: int, end: int) -> float:
+def _grown(iteration: int, start: float, end: float) -> float:
     """0 until `start`, 1 from `end` on, and a straight line in between."""
     return min(max((iteration - start) / (end - start), 0.0), 1.0)
 
