@@ -21,10 +21,13 @@ exploration, at the speed and frequency the gait is at home at, the first 2 s le
 are defined in `gaitshift.gait_analysis`, limits in `gait_analysis/limits.py` and
 `evaluation/trials.py`; what misses its limit is in bold.
 This page is made by `tools/gait_results.py` from the records beside the policies.
+"""
 
-These policies come from the last steps towards today's recipe, so that training them anew gives
-other, similar ones: trot, pace and bound paid for feet that touched again within 0.08 s, where
-`chatter` now stands, and all of them were trained with Adam's fused form.
+
+COMMANDS = """## Commands
+
+Speeds over their range at the gait's own stride frequency, then frequencies at its own speed: what
+was asked for → what came of it on flat ground (`gaitshift evaluate GAIT --commands`).
 """
 
 
@@ -33,6 +36,7 @@ def page() -> str:
     names = [*FIRST_GAITS, *(name for name in policy.shipped() if name not in FIRST_GAITS)]
     records = {name: json.loads((POLICIES / f"{name}.json").read_text()) for name in names}
     parts = [HEAD, _figures(records), "## Trials\n", _trials(records)]
+    parts += [COMMANDS, _commands(records)]
     parts += [_gait(name, record) for name, record in records.items()]
     return "\n".join(parts)
 
@@ -83,6 +87,23 @@ def _trials(records: dict[str, Any]) -> str:
     titles = list(dict.fromkeys(title for rows in trials.values() for title in rows))
     body = [(title, *(_value(rows.get(title)) for rows in trials.values())) for title in titles]
     return _table(("trial", *trials), body)
+
+
+def _commands(records: dict[str, Any]) -> str:
+    """One row a gait: what was asked for and what came of it."""
+    rows = []
+    for name, record in records.items():
+        asked = record["evaluation"]["commands"]
+        speeds, frequencies = asked[: len(asked) // 2], asked[len(asked) // 2 :]
+        pairs = (
+            ", ".join(f"{row[command]:.2f} → {row[figure]:.2f}" for row in part)
+            for part, command, figure in (
+                (speeds, "forward_speed", "speed_mean"),
+                (frequencies, "stride_frequency", "cycles_per_s"),
+            )
+        )
+        rows.append((name, *pairs, f"{min(row['survival'] for row in asked):.2f}"))
+    return _table(("gait", "speed [m/s]", "cycles [Hz]", "least survival"), rows)
 
 
 def _is_ground(row: dict[str, Any]) -> bool:

@@ -8,12 +8,13 @@ import argparse
 import csv
 import json
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 
 from gait_results import PAGE, page
 
 from gaitshift import policy
-from gaitshift.evaluation import SIZES, run_trials
+from gaitshift.evaluation import SIZES, follow_commands, run_trials
 from gaitshift.plots import hildebrand_diagram, training_curves
 
 POLICIES = Path(policy.__file__).parent / "policies"
@@ -37,6 +38,7 @@ def ship(run: Path, trials: str) -> None:
         "evaluation": {
             "command": f"gaitshift evaluate {name} --trials {trials}",
             "trials": [row.to_dict() for row in rows],
+            "commands": [asdict(row) for row in follow_commands(loaded)],
             "flat": figures,
         },
     }
