@@ -44,10 +44,11 @@ This page is made by `python tools/training_evidence.py seeds`.
 """
 ADDITIONS_HEAD = """# The additions to Table I, taken away
 
-Trot on the flat stage of the default recipe ({iterations} iterations), whole and without each of the
-seven terms that the reward adds to the paper's Table I (`gaitshift.reward.ADDITIONS`): means over
-three seeds, each policy judged on flat ground, 64 robots for 12 s. Clean: how many of the three keep
-all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
+Trot on the flat stage of the default recipe ({iterations} iterations), whole and without each of
+the seven terms that the reward adds to the paper's Table I (`gaitshift.reward.ADDITIONS`): means
+over three seeds, each policy judged on flat ground, 64 robots for 12 s. Clean: how many of the
+three keep all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a
+cycle.
 This page is made by `python tools/training_evidence.py additions`.
 """
 
