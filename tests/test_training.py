@@ -45,6 +45,7 @@ TINY = Recipe(
     strict_from=1,
     strict_until=4,
     command_from=0,
+    settle=0.5,
     command_until=5,
     checkpoint_every=2,
     threads=1,
@@ -229,9 +230,12 @@ def measures(ground):
 
 
 def sorts(grounds):
-    """Names of the kinds, told by the ground itself: a plane, steps along x, or noise."""
+    """Names of the kinds, told by the ground itself: level, a plane, steps along x, or noise."""
     told = []
     for ground in grounds:
+        if np.ptp(ground.height) == 0:
+            told.append("level")
+            continue
         bent = np.abs(np.diff(ground.height, n=2, axis=1)).max() > 1e-9
         same_across = np.ptp(ground.height, axis=0).max() == 0
         told.append("noise" if bent and not same_across else "stairs" if bent else "plane")
@@ -240,25 +244,26 @@ def sorts(grounds):
 
 def test_the_same_numbers_give_the_same_grounds_and_others_others():
     def drawn(within, seed):
-        return [ground.height.tobytes() for ground in draw_grounds(ROUGH, within, seed)]
+        rough = (ground for ground in draw_grounds(ROUGH, within, seed) if not ground.is_flat)
+        return [ground.height.tobytes() for ground in rough]
 
     assert drawn(5, 1) == drawn(5, 1)
     for other in (drawn(10, 1), drawn(5, 2)):
         assert all(one != another for one, another in zip(drawn(5, 1), other, strict=True))
-    assert len(set(drawn(5, 1))) == 8, "and no two robots' fields are alike"
+    assert len(set(drawn(5, 1))) == 6, "and no two rough fields are alike"
 
 
-def test_half_of_the_fields_are_noise_and_the_others_slopes_and_stairs():
+def test_two_fields_stay_level_three_are_noise_and_the_others_a_slope_and_stairs():
     for within in (0, 20, 45):
         grounds = draw_grounds(ROUGH, within, 3)
-        assert sorts(grounds) == ["noise"] * 4 + ["plane"] * 2 + ["stairs"] * 2
+        assert sorts(grounds) == ["level"] * 2 + ["noise"] * 3 + ["plane"] + ["stairs"] * 2
         assert len({ground.extent for ground in grounds}) == 1, "robots share one rectangle"
 
 
 def test_slopes_rise_in_any_direction():
     angles = []
-    for within in range(0, 50, 2):
-        for ground in draw_grounds(ROUGH, within, 0)[4:6]:
+    for within in range(0, 50):
+        for ground in draw_grounds(ROUGH, within, 0)[5:6]:
             along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
             angles.append(np.arctan2(along_y.mean(), along_x.mean()))
     quarters = np.bincount(np.floor(np.array(angles) / (np.pi / 2)).astype(int) + 2, minlength=4)
@@ -272,7 +277,7 @@ def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
             for within in range(0, 50, 2)
         ]
     )
-    limits = {"noise": (slice(0, 4), 0, 0.15), "plane": (slice(4, 6), 1, 12.0)}
+    limits = {"noise": (slice(2, 5), 0, 0.15), "plane": (slice(5, 6), 1, 12.0)}
     limits |= {"stairs": (slice(6, 7), 2, 0.06), "steps": (slice(7, 8), 2, 0.1)}
     for name, (fields_, measure, limit) in limits.items():
         most = found[:, fields_, measure].max(axis=1)
@@ -284,7 +289,7 @@ def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
 
 @pytest.mark.parametrize(
     ("measure", "rough"),
-    [("amplitude", [0, 1, 2, 3]), ("slope", [4, 5]), ("stair", [6]), ("step", [7])],
+    [("amplitude", [2, 3, 4]), ("slope", [5]), ("stair", [6]), ("step", [7])],
 )
 def test_a_stage_of_one_kind_leaves_the_fields_of_the_others_level(measure, rough):
     stage = Stage(name="one", iterations=10, **{measure: 0.1})

@@ -11,8 +11,9 @@ FIELD = 20.0
 FIRST_SHARE = 0.3
 """Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
 
-KINDS = ("perlin", "perlin", "perlin", "perlin", "slope", "slope", "stair", "step")
-"""The fields that robots share out at a time; ours: half of them are the paper's noise."""
+KINDS = ("flat", "flat", "perlin", "perlin", "perlin", "slope", "stair", "step")
+"""The fields that robots share out at a time; ours: level ground stays among them, or speeds and
+touchdowns that were learned on it get lost."""
 
 STAIR_CELL = 0.05
 """Distance between samples of stairs [m]; ours: a face leans over one of them."""
@@ -44,6 +45,8 @@ def draw_grounds(stage: Stage, within: int, seed: int) -> tuple[Terrain, ...]:
 
 
 def _draw(kind: str, stage: Stage, grown: float, rng: np.random.Generator) -> Terrain:
+    if kind == "flat":
+        return flat(FIELD, FIELD)
     share = grown * rng.uniform(0.0, 1.0) ** 0.5
     if kind == "slope":
         towards = rng.uniform(0.0, 360.0)
