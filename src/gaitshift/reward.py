@@ -52,10 +52,10 @@ class RewardConfig:
     speed_tracking: float = 12.0
     """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: Table I's bell is so wide that a walk at 1 m/s
     in place of 1.2 m/s loses 4 % of it."""
-    stance_feet: float = 8.0
+    stance_feet: float = 12.0
     """Times the share of the feet that are, down or up, as the stance of the present state has
     them; ours: the bonus pays the instant of a change only, and this tells each foot apart."""
-    stance_pattern: float = 8.0
+    stance_pattern: float = 12.0
     """Where that share is 1; ours: else three right feet out of four would do."""
     slip: float = -0.5
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""

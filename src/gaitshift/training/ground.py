@@ -11,7 +11,7 @@ FIELD = 20.0
 FIRST_SHARE = 0.3
 """Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
 
-KINDS = ("flat", "flat", "perlin", "perlin", "perlin", "slope", "stair", "step")
+KINDS = ("flat", "flat", "flat", "perlin", "perlin", "slope", "stair", "step")
 """The fields that robots share out at a time; ours: level ground stays among them, or speeds and
 touchdowns that were learned on it get lost."""
 
