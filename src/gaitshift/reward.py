@@ -61,7 +61,7 @@ class RewardConfig:
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
     power: float = -0.015
     """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
-    chatter: float = -60.0
+    chatter: float = -80.0
     """Times the feet that come down out of place (twice in a swing, or states too early), and the
     environment's strictness; ours: one touchdown a swing is clean, and free at any frequency."""
     action_rate: float = -0.02
