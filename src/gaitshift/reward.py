@@ -59,7 +59,7 @@ class RewardConfig:
     """Where that share is 1; ours: else three right feet out of four would do."""
     slip: float = -0.5
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
-    power: float = -0.015
+    power: float = -0.0225
     """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
     chatter: float = -80.0
     """Times the feet that come down out of place (twice in a swing, or states too early), and the
