@@ -49,7 +49,7 @@ class RewardConfig:
     """Times ‖q - q_init‖² (Table I)."""
     joint_velocity: float = -0.01
     """Times ‖q̇‖² [s²] (Table I)."""
-    speed_tracking: float = 12.0
+    speed_tracking: float = 15.0
     """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: Table I's bell is so wide that a walk at 1 m/s
     in place of 1.2 m/s loses 4 % of it."""
     stance_feet: float = 12.0

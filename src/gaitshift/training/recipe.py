@@ -83,11 +83,11 @@ class Recipe:
         Stage(
             name="rough",
             iterations=500,
-            amplitude=0.18,
-            slope=14.0,
+            amplitude=0.16,
+            slope=12.0,
             stair=0.06,
             step=0.12,
-            push=150.0,
+            push=130.0,
         ),
     )
     """Flat ground, then Perlin ground with pushes (paper III-D)."""
