@@ -12,7 +12,7 @@ from gaitshift.policy import Policy
 POINTS = 5
 """Commands of a range that are tried, its ends among them."""
 
-ROBOTS, SECONDS = 32, 8.0
+ROBOTS, SECONDS = 16, 6.0
 """Robots of each run and its length [s]."""
 
 
