@@ -54,7 +54,7 @@ This page is made by `python tools/training_evidence.py additions`.
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ours(Setting):
+class Default(Setting):
     """The default recipe, or one like it, with the machines as they are."""
 
     def machine(self, gait: str) -> RewardMachine:
@@ -62,7 +62,7 @@ class Ours(Setting):
         return gaits.load(gait)
 
 
-def setting(without: str | None = None) -> Ours:
+def setting(without: str | None = None) -> Default:
     """The flat stage on one core, without one of the additions."""
     recipe = Recipe(threads=1, physics_threads=1)
     recipe = recipe.with_iterations(recipe.stages[0].iterations)
@@ -70,10 +70,10 @@ def setting(without: str | None = None) -> Ours:
         reward = replace(recipe.env.reward, **{without: 0.0})
         recipe = replace(recipe, env=replace(recipe.env, reward=reward))
     name = "ours" if without is None else f"no-{without}"
-    return Ours(name=name, group="ours", label=without or "whole", recipe=recipe)
+    return Default(name=name, group="ours", label=without or "whole", recipe=recipe)
 
 
-def jobs_of(settings: Iterable[Ours], names: Iterable[str], seeds: Iterable[int]) -> list[Job]:
+def jobs_of(settings: Iterable[Default], names: Iterable[str], seeds: Iterable[int]) -> list[Job]:
     """Every setting with every gait and seed."""
     names, seeds = tuple(names), tuple(seeds)
     return [

@@ -113,7 +113,7 @@ class Recipe:
     """Iteration at which λ has grown to 1, by the same step each iteration."""
     settle: float = 0.1
     """Last share of the iterations, in which the policy settles: `desired_kl` and `entropy` fall to
-    a tenth; ours: without it the speed of the last policy is off by up to 0.07 m/s, now to this
+    a tenth; ours: without it the speed of the last policy is off by up to 0.2 m/s, now to this
     side, now to that."""
     checkpoint_every: int = 50
     """Iterations between two checkpoints."""
