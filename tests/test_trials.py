@@ -13,12 +13,15 @@ from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.evaluation import SIZES, run_trials
 from gaitshift.evaluation import commands as commands_module
 from gaitshift.evaluation import trials as trials_module
-from gaitshift.evaluation.trials import TRIALS, Row, Size, lateral_errors
+from gaitshift.evaluation.trials import TRIALS, Row, Size, distances, lateral_errors
 from gaitshift.terrain import flat, from_spec
 from gaitshift.training.export import describe, export
 from gaitshift.training.learner import Learner
 from gaitshift.training.recipe import PpoConfig, Recipe
 from synthetic import log_of
+
+GROUNDS = sum(trial.figure == "survival" for trial in TRIALS)
+"""Grounds to survive, each with a distance too."""
 
 TINY = Size(pushed=6, episodes=3, seconds=0.3, distance=0.2)
 
@@ -54,10 +57,13 @@ def tried(walk_file):
 def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
     (rows, figures, log), done = tried
     titles = [row.trial for row in rows]
-    assert len(set(titles)) == len(rows) == len(TRIALS) + 7
+    assert len(set(titles)) == len(rows) == len(TRIALS) + GROUNDS + 7
     assert [title for title in titles if "perlin:0.20" in title]
     survival = [row for row in rows if row.trial.startswith("survival")]
     assert all(row.value == 1.0 for row in survival), "standing for 0.3 s is no feat"
+    shares = [row for row in rows if row.trial.startswith("distance_share")]
+    assert len(shares) == len(survival) == GROUNDS == 10
+    assert all(row.value < 1.0 and row.limit is None for row in shares), "nobody walks"
     lateral = [row for row in rows if row.trial.startswith("lateral")]
     assert all(row.value is None and row.passed is False for row in lateral), "nobody walks"
     assert log.contact.shape == (30, 3, 4)
@@ -105,6 +111,15 @@ def test_the_lateral_error_is_taken_at_the_distance_and_who_never_arrives_is_bey
     assert lateral_errors(log, 2.0) == pytest.approx([0.2, np.inf, np.inf])
 
 
+def test_the_distance_is_taken_along_x_until_the_fall():
+    """Robots at 1 m/s from x = 5 for 3 s: one goes on, one falls after 1 s, one at once."""
+    log = log_of(np.zeros((301, 3, 4), dtype=bool))
+    log.qpos[:, :, 0] = 5.0 + np.arange(301)[:, None] / 100
+    log.fallen[101:, 1] = True
+    log.fallen[:, 2] = True
+    assert distances(log) == pytest.approx([3.0, 1.0, 0.0], abs=1e-5)
+
+
 @pytest.mark.parametrize(
     ("value", "bound", "limit", "passed"),
     [
@@ -135,7 +150,7 @@ def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys
     monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_: tried[0])
     main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
     said = json.loads(capsys.readouterr().out)
-    assert len(said["trials"]) == len(TRIALS) + 7
+    assert len(said["trials"]) == len(TRIALS) + GROUNDS + 7
     assert said["size"]["name"] == "quick"
     main(["evaluate", str(walk_file), "--trials", "quick"])
     table = capsys.readouterr().out

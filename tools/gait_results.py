@@ -14,6 +14,9 @@ from gaitshift.legs import LEGS
 POLICIES = Path(policy.__file__).parent / "policies"
 PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"
 
+GROUND_FIGURES = ("survival", "distance_share", "lateral_error_p95")
+"""Figures that a trial gives of its ground, in the order of their rows."""
+
 HEAD = """# The shipped gaits
 
 One policy a gait, one recipe for all of them (`gaitshift train GAIT`), seed 0. Flat ground, no
@@ -85,6 +88,7 @@ def _trials(records: dict[str, Any]) -> str:
         for name, record in records.items()
     }
     titles = list(dict.fromkeys(title for rows in trials.values() for title in rows))
+    titles.sort(key=lambda title: GROUND_FIGURES.index(title.split()[0]))
     body = [(title, *(_value(rows.get(title)) for rows in trials.values())) for title in titles]
     return _table(("trial", *trials), body)
 
@@ -107,7 +111,7 @@ def _commands(records: dict[str, Any]) -> str:
 
 
 def _is_ground(row: dict[str, Any]) -> bool:
-    return row["trial"].startswith(("survival", "lateral_error"))
+    return row["trial"].split()[0] in GROUND_FIGURES
 
 
 def _gait(name: str, record: dict[str, Any]) -> str:
