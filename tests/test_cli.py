@@ -158,6 +158,9 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
     assert row["iteration"] == 2
     names = {path.name for path in out.iterdir()}
     assert {"config.json", "progress.csv", "checkpoints", "policy.onnx", "tensorboard"} <= names
+    assert row["verdict"]["gait"] == "none"
+    assert row["verdict"]["clean"] is False
+    assert (out / "verdicts.csv").read_text().splitlines()[-1].startswith("2,none,False,")
     main(["evaluate", row["policy"], "--episodes", "2", "--seconds", "0.2", "--json"])
     assert json.loads(capsys.readouterr().out)["episodes"] == 2
 

@@ -435,6 +435,27 @@ def test_a_run_that_was_killed_twice_at_other_steps_ends_with_the_same_bits(tmp_
     assert rows(folder) == rows(whole[0].folder)
 
 
+def test_the_policy_of_every_checkpoint_is_judged_once_though_the_run_was_killed(tmp_path):
+    """Killed between checkpoints 2 and 4, after a verdict on a policy that was then lost."""
+    judged = []
+
+    def judge(path):
+        judged.append(policy.load(path).info.training["iterations"])
+        return {"gait": "trot", "misses": "speed_error 0.2; clearance FL 0.01"}
+
+    folder = tmp_path / "run"
+    with pytest.raises(KilledError):
+        create(folder).train(kill_at(3), judge)
+    with (folder / "verdicts.csv").open("a") as file:
+        file.write("4,none,\n")
+    Run.resume(folder).train(judge=judge)
+    with (folder / "verdicts.csv").open(newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert judged == [int(line["iteration"]) for line in lines] == [2, 4, 6]
+    assert {line["gait"] for line in lines} == {"trot"}
+    assert lines[0]["misses"] == "speed_error 0.2; clearance FL 0.01"
+
+
 def test_an_interrupted_run_leaves_the_policy_as_it_stands(tmp_path):
     folder = tmp_path / "run"
     with pytest.raises(KeyboardInterrupt):

@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from gaitshift import gaits
 from gaitshift.cli.output import emit_json, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import glance
 
 if TYPE_CHECKING:
     from gaitshift.training.run import Row, Run
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
 class Train:
     """Train a gait with PPO: flat ground first, then rough ground with pushes.
 
-    The folder gets config.json, progress.csv, tensorboard/, checkpoints/ and policy.onnx. Ctrl-C
-    leaves a folder that --resume goes on from.
+    The folder gets config.json, progress.csv, verdicts.csv (a short look at the policy at each
+    checkpoint), tensorboard/, checkpoints/ and policy.onnx. Ctrl-C leaves a folder that --resume
+    goes on from.
     """
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
@@ -46,22 +48,25 @@ class Train:
     overwrite: bool = False
     """Replace an earlier run in the folder."""
     json: bool = False
-    """One JSON object on stdout: the last line of progress.csv and the policy's path."""
+    """One JSON object on stdout: the last line of progress.csv, the last verdict, and the policy's
+    path."""
 
     def run(self) -> None:
         """Trains, with a progress bar."""
         run = self._open()
-        last: list[Row] = []
+        bar = _Bar(run)
         try:
-            with _Bar(run) as bar:
-                path = run.train(lambda row: (last.__setitem__(slice(None), [row]), bar(row))[1])
+            with bar:
+                path = run.train(bar, bar.judge)
         except KeyboardInterrupt:
             say(f"gaitshift: interrupted; go on with: gaitshift train --resume {run.folder}")
             sys.exit(130)
         if self.json:
-            emit_json({**(last[0] if last else {}), "policy": str(path)})
-        else:
-            print(f"policy written to {path}; judge it with: gaitshift evaluate {path}")
+            emit_json({**bar.row, "verdict": bar.verdict or None, "policy": str(path)})
+            return
+        if bar.verdict:
+            print(f"{_spell(bar.verdict)}, {bar.verdict['misses'] or 'no limit missed'}")
+        print(f"policy written to {path}; judge it with: gaitshift evaluate {path}")
 
     def _open(self) -> "Run":
         try:
@@ -95,10 +100,19 @@ class Train:
         )
 
 
+def _spell(verdict: "Row") -> str:
+    """What a verdict calls the gait, and whether it is clean."""
+    return f"{verdict['gait']}, {'clean' if verdict['clean'] else 'not clean'}"
+
+
 class _Bar:
-    """Progress of a training: steps/s, speed, survival and time left."""
+    """Progress of a training: steps/s, speed, survival, the last verdict and time left."""
 
     def __init__(self, run: "Run") -> None:
+        self.row: Row = {}
+        """The last line of progress.csv."""
+        self.verdict: Row = {}
+        """The last verdict."""
         self._run = run
         console = Console(stderr=True)
         self._progress = Progress(
@@ -122,7 +136,13 @@ class _Bar:
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
 
+    def judge(self, path: Path) -> "Row":
+        """A short look at the policy as it stands."""
+        self.verdict = glance(path)
+        return self.verdict
+
     def __call__(self, row: "Row") -> None:
+        self.row = row
         start, first = self._clock
         iterations = row["iteration"] - first
         recipe = self._run.recipe
@@ -131,4 +151,6 @@ class _Bar:
             f"{row['stage']}  {rate:,.0f} steps/s  {row['speed']:.2f} m/s  "
             f"survival {row['survival']:.2f}"
         )
+        if self.verdict:
+            seen += f"  {_spell(self.verdict)}"
         self._progress.update(self._task, completed=row["iteration"], seen=seen)

@@ -1,6 +1,5 @@
 """A training run: its folder, its loop, and how it goes on after it was killed."""
 
-import csv
 import json
 import platform
 import shutil
@@ -23,14 +22,16 @@ from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
 from gaitshift.training.ground import FIELD, draw_grounds, stage_at
 from gaitshift.training.learner import Learner
+from gaitshift.training.lines import Row, append, trim
 from gaitshift.training.recipe import Recipe
 
-CONFIG, PROGRESS, CHECKPOINTS, POLICY = "config.json", "progress.csv", "checkpoints", "policy.onnx"
+CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
+PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
 
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
-Row = dict[str, Any]
-"""A line of `progress.csv`."""
+Judge = Callable[[Path], Row]
+"""Looks at a policy file and gives its verdict, a line of `verdicts.csv`."""
 
 
 class Run:
@@ -119,13 +120,17 @@ class Run:
         run._load_checkpoint(checkpoints[-1])
         return run
 
-    def train(self, report: Callable[[Row], None] = lambda row: None) -> Path:
+    def train(
+        self, report: Callable[[Row], None] = lambda row: None, judge: Judge | None = None
+    ) -> Path:
         """Runs to the end, calling `report` after each iteration; gives the policy's path.
 
+        At each checkpoint the policy is written out for `judge`, and its verdict written down.
         Interrupted by Ctrl-C it leaves the last checkpoint, and the policy as it stands.
         """
         writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
-        self._trim_progress()
+        for name in (PROGRESS, VERDICTS):
+            trim(self.folder / name, self.iteration)
         try:
             while self.iteration < self.recipe.iterations:
                 row = self.iterate()
@@ -133,6 +138,8 @@ class Run:
                 report(row)
                 if self._is_checkpoint():
                     self._save_checkpoint()
+                    if judge is not None:
+                        self._write_verdict(judge)
         finally:
             writer.close()
             self.export()
@@ -210,33 +217,15 @@ class Run:
         self.learner.env.push_at_most(stage.push)
 
     def _log(self, row: Row, writer: SummaryWriter) -> None:
-        path = self.folder / PROGRESS
-        new = not path.exists()
-        with path.open("a", newline="") as file:
-            lines = csv.DictWriter(file, row.keys())
-            if new:
-                lines.writeheader()
-            lines.writerow(row)
+        append(self.folder / PROGRESS, row)
         for name, value in row.items():
             if name not in ("iteration", "stage"):
                 writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
 
-    def _trim_progress(self) -> None:
-        """Forgets the lines that a killed run wrote after its last checkpoint."""
-        path = self.folder / PROGRESS
-        if not path.exists():
-            return
-        with path.open(newline="") as file:
-            rows = [row for row in csv.DictReader(file) if int(row["iteration"]) <= self.iteration]
-        if not rows:
-            path.unlink()
-            return
-        part = path.with_suffix(".part")
-        with part.open("w", newline="") as file:
-            lines = csv.DictWriter(file, rows[0].keys())
-            lines.writeheader()
-            lines.writerows(rows)
-        part.replace(path)
+    def _write_verdict(self, judge: Judge) -> None:
+        self.export()
+        verdict = judge(self.folder / POLICY)
+        append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
 
 
 def _seed_at(seed: int, iteration: int) -> int:
