@@ -13,6 +13,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from gaitshift import gaits
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
+from gaitshift.reward import RewardConfig
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
 from gaitshift.terrain import flat, perlin, slope
@@ -44,6 +45,17 @@ HOP = RewardMachine.from_dict(
 )
 RANGED = replace(HOP, dwell_range=(2, 8), speed=0.9, speed_range=(0.4, 1.5))
 """The same gait for several speeds and stride frequencies."""
+UNHURRIED = RewardMachine.from_dict(
+    HOP.to_dict()
+    | {
+        "dwell": 8,
+        "dwell_range": [8, 8],
+        "transition": [
+            edge.to_dict() | {"dwell": 8, "bonus": 1.0, "swing_height": 0.0} for edge in HOP.edges
+        ],
+    }
+)
+"""The same gait at a slow stride, whatever the height of the swing."""
 FOLD = np.array([[0.0, 4.0, -6.0] * 2 + [0.0, -4.0, 6.0] * 2])
 """An action that folds all legs, so that the body comes to the ground."""
 
@@ -269,6 +281,8 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
                 and all(not contact[foot] for foot in up)
             )
             share = min(min(max(swing[foot] / SWING_HEIGHT, 0.0), 1.0) for foot in down)
+            late = max(deltas[robot] + 1 - DWELL - 2, 0) / (0.5 * DWELL)
+            on_time = max(1.0 - late, 0.0)
             if taken:  # the foot of the state left begins its swing
                 swing[states[robot]] = clearance[states[robot]]
             states[robot] = target if taken else states[robot]
@@ -281,7 +295,7 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
             weight = env.config.reward.stance_feet
             assert info["reward_terms"]["stance_feet"][robot] == weight * agreeing / 4
             terms = sum(float(term[robot]) for term in info["reward_terms"].values())
-            bonus = env.config.reward.bonus * factor * share if taken else 0.0
+            bonus = env.config.reward.bonus * factor * share * on_time if taken else 0.0
             assert reward[robot] == pytest.approx(terms + bonus, abs=1e-9)
             if terminated[robot] or truncated[robot]:
                 falls += bool(terminated[robot])
@@ -651,7 +665,8 @@ def test_a_machine_that_accepts_ends_the_episode_with_its_bonus_and_without_a_fa
             "transition": [{"from": "standing", "to": "done", "down": ["BR"], "up": ["FL"]}],
         }
     )
-    config = EnvConfig(velocity_noise=0.0, joint_noise=0.0)
+    reward_of = RewardConfig(bonus_punctuality=0.0)
+    config = EnvConfig(velocity_noise=0.0, joint_noise=0.0, reward=reward_of)
     env = GaitEnv(tick_off, FLAT, 2, config=config, threads=1)
     env.reset(seed=0)
     motions = keep_motions(env, monkeypatch)
@@ -758,6 +773,7 @@ def test_robots_start_on_the_ground_wherever_they_start():
     np.testing.assert_allclose(clearance.min(axis=1), 0.0, atol=1e-9)
     assert np.ptp(env.world.motion.base_position_w[:, :2], axis=0).min() > 1.0
     assert np.ptp(env.world.motion.yaw) > 3.0
+    np.testing.assert_allclose(np.sin(env.world.motion.yaw), 0.0, atol=1e-9)
 
 
 def test_new_ground_lets_robots_go_on_as_they_moved():
@@ -841,8 +857,9 @@ def test_without_pushes_a_standing_robot_stays_where_it_stands():
 @pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
 def test_strictness_is_how_far_the_bonus_depends_on_the_swing(strictness, monkeypatch):
     asked, step = 0.2, []
+    config = EnvConfig(reward=RewardConfig(bonus_punctuality=0.0))
     envs = [
-        GaitEnv(with_swing_height(height), FLAT, 4, config=EnvConfig(), threads=1)
+        GaitEnv(with_swing_height(height), FLAT, 4, config=config, threads=1)
         for height in (0.0, asked)
     ]
     for env in envs:
@@ -863,6 +880,38 @@ def test_strictness_is_how_far_the_bonus_depends_on_the_swing(strictness, monkey
             step.append(share)
             swing[robot, 1 - entered] = motions[-1].clearance[robot, 1 - entered]
     assert len([share for share in step if 0 < share < 1]) > 5
+
+
+@pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
+def test_a_late_change_earns_less_of_the_bonus(strictness):
+    """Against an env that does not ask: full until 2 steps late, nothing half a dwell after it."""
+    seen = []
+    envs = [
+        GaitEnv(
+            UNHURRIED,
+            FLAT,
+            4,
+            config=EnvConfig(reward=RewardConfig(bonus_punctuality=weight)),
+            threads=1,
+        )
+        for weight in (0.0, 1.0)
+    ]
+    for env in envs:
+        env.strictness = strictness
+        env.reset(seed=0)
+    waited = np.zeros(4, dtype=int)
+    for action in arbitrary_actions(2, 300, 4, size=1.5):
+        (_, free, *_), (_, paid, ended, cut, info) = (env.step(action) for env in envs)
+        waited += 1
+        for robot in np.flatnonzero(info["changed"]):
+            late = max(waited[robot] - 8 - 2, 0)
+            lost = strictness * min(late / 4, 1.0) * envs[0].config.reward.bonus
+            assert free[robot] - paid[robot] == pytest.approx(lost, abs=1e-9)
+            seen.append(late)
+        waited[info["changed"] | ended | cut] = 0
+    assert min(seen) == 0
+    assert {1, 2, 3} & set(seen)
+    assert max(seen) > 4
 
 
 def with_swing_height(height):

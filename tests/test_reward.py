@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 from gaitshift.command import Command
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
-from gaitshift.reward import ADDITIONS, BONUS_MODES, RewardConfig, walk_reward, with_bonus
+from gaitshift.reward import (
+    ADDITIONS,
+    BONUS_MODES,
+    RewardConfig,
+    earned_bonus,
+    walk_reward,
+    with_bonus,
+)
 
 TABLE_I = {
     "forward_velocity": 10.0,
@@ -226,6 +233,31 @@ def test_each_bonus_mode_equals_the_hand_table(mode):
         np.array([1.0, 1.0, 0.0, 0.0, 2.0]),
     )
     np.testing.assert_array_equal(reward, BONUS_TABLE[mode])
+
+
+@pytest.mark.parametrize(
+    ("swing", "punctuality", "strictness", "earned"),
+    [
+        (1.0, 1.0, 1.0, [2.0, 1.0, 0.5, 0.25, 0.0]),
+        (1.0, 1.0, 0.0, [2.0, 2.0, 1.0, 1.0, 0.0]),
+        (1.0, 0.0, 1.0, [2.0, 1.0, 1.0, 0.5, 0.0]),
+        (0.0, 1.0, 1.0, [2.0, 2.0, 0.5, 0.5, 0.0]),
+        (0.5, 1.0, 0.5, [2.0, 1.75, 0.75, 0.65625, 0.0]),
+    ],
+)
+def test_swing_and_punctuality_each_keep_their_share_of_the_bonus(
+    swing, punctuality, strictness, earned
+):
+    """High and on time, low, late, low and late, no change."""
+    config = RewardConfig(bonus_swing=swing, bonus_punctuality=punctuality)
+    bonus = earned_bonus(
+        config,
+        np.array([2.0, 2.0, 1.0, 1.0, 0.0]),
+        swing_share=np.array([1.0, 0.5, 1.0, 0.5, 1.0]),
+        on_time=np.array([1.0, 1.0, 0.5, 0.5, 0.0]),
+        strictness=strictness,
+    )
+    np.testing.assert_allclose(bonus, earned)
 
 
 def test_multiplying_punishes_a_good_change_while_the_walk_is_bad_and_adding_does_not():

@@ -370,6 +370,28 @@ def test_feet_that_never_dally_go_once_round_in_a_stride(tables, command):
     assert steps == machine.stride(command)
 
 
+LATE = [
+    # dwell of the state 20: on time until step 22, worth nothing from step 32 on
+    (RANGED, 0, None, {1: 1.0, 20: 1.0, 22: 1.0, 23: 0.9, 27: 0.5, 32: 0.0, 90: 0.0}),
+    (RANGED, 0, 10, {12: 1.0, 13: 0.8, 17: 0.0}),
+    # The second diagonal of the limping trot is to last half as long; 15 steps of 30, 8 of 15.
+    (LIMP, 1, None, {12: 1.0, 13: 0.8, 17: 0.0}),
+    (LIMP, 1, 30, {17: 1.0, 18: 1 - 1 / 7.5, 25: 0.0}),
+    (LIMP, 1, 15, {10: 1.0, 11: 0.75, 14: 0.0}),
+    (RANGED, 0, 0, {1: 1.0, 500: 1.0}),
+]
+
+
+@pytest.mark.parametrize(("tables", "state", "dwell", "table"), LATE)
+def test_a_change_is_punctual_for_two_steps_and_worth_nothing_half_a_dwell_later(
+    tables, state, dwell, table
+):
+    machine = RewardMachine.from_dict(tables)
+    waited = np.array(list(table)) - 1  # the step now ending counts
+    seen = machine.punctuality(np.full(len(waited), state), waited, dwell)
+    np.testing.assert_allclose(seen, list(table.values()), atol=1e-12)
+
+
 def test_the_cycle_takes_the_first_way_out_and_ends_where_there_is_none():
     sink = {"name": "sink", "accepting": True}
     out = {"from": "FR_BL", "to": "sink", "down": [], "up": list(FEET)}

@@ -14,7 +14,7 @@ from tensordict import TensorDict
 from gaitshift import gaits, policy
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
-from gaitshift.reward import RewardConfig
+from gaitshift.reward import BONUS_SHARES, RewardConfig
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
 from gaitshift.training.ground import draw_grounds, stage_at
@@ -250,20 +250,20 @@ def test_the_same_numbers_give_the_same_grounds_and_others_others():
     assert drawn(5, 1) == drawn(5, 1)
     for other in (drawn(10, 1), drawn(5, 2)):
         assert all(one != another for one, another in zip(drawn(5, 1), other, strict=True))
-    assert len(set(drawn(5, 1))) == 5, "and no two rough fields are alike"
+    assert len(set(drawn(5, 1))) == 8, "and no two rough fields are alike"
 
 
-def test_three_fields_stay_level_two_are_noise_and_the_others_a_slope_and_stairs():
+def test_two_fields_stay_level_two_are_noise_and_the_others_a_slope_and_stairs():
     for within in (0, 20, 45):
         grounds = draw_grounds(ROUGH, within, 3)
-        assert sorts(grounds) == ["level"] * 3 + ["noise"] * 2 + ["plane"] + ["stairs"] * 2
+        assert sorts(grounds) == ["level"] * 2 + ["noise"] * 2 + ["plane"] + ["stairs"] * 5
         assert len({ground.extent for ground in grounds}) == 1, "robots share one rectangle"
 
 
 def test_slopes_rise_in_any_direction():
     angles = []
     for within in range(0, 50):
-        for ground in draw_grounds(ROUGH, within, 0)[5:6]:
+        for ground in draw_grounds(ROUGH, within, 0)[4:5]:
             along_y, along_x = np.gradient(ground.height, *ground.cell[::-1])
             angles.append(np.arctan2(along_y.mean(), along_x.mean()))
     quarters = np.bincount(np.floor(np.array(angles) / (np.pi / 2)).astype(int) + 2, minlength=4)
@@ -277,8 +277,8 @@ def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
             for within in range(0, 50, 2)
         ]
     )
-    limits = {"noise": (slice(3, 5), 0, 0.15), "plane": (slice(5, 6), 1, 12.0)}
-    limits |= {"stairs": (slice(6, 7), 2, 0.06), "steps": (slice(7, 8), 2, 0.1)}
+    limits = {"noise": (slice(2, 4), 0, 0.15), "plane": (slice(4, 5), 1, 12.0)}
+    limits |= {"stairs": (slice(5, 7), 2, 0.06), "steps": (slice(7, 10), 2, 0.1)}
     for name, (fields_, measure, limit) in limits.items():
         most = found[:, fields_, measure].max(axis=1)
         assert most.max() <= limit * (1 + 1e-9), name
@@ -289,7 +289,7 @@ def test_no_ground_exceeds_what_its_stage_says_and_late_ones_come_near_it():
 
 @pytest.mark.parametrize(
     ("measure", "rough"),
-    [("amplitude", [3, 4]), ("slope", [5]), ("stair", [6]), ("step", [7])],
+    [("amplitude", [2, 3]), ("slope", [4]), ("stair", [5, 6]), ("step", [7, 8, 9])],
 )
 def test_a_stage_of_one_kind_leaves_the_fields_of_the_others_level(measure, rough):
     stage = Stage(name="one", iterations=10, **{measure: 0.1})
@@ -324,7 +324,7 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
     figures = {"iteration", "stage", "steps", "wall_s", "reward", "speed", "changes_per_s"}
     figures |= {"stance_fraction", "survival", "value_loss", "action_std", "learning_rate"}
     weights = {field.name for field in fields(RewardConfig)}
-    terms = weights - {"bonus_mode"}
+    terms = weights - {"bonus_mode", *BONUS_SHARES}
     assert set(reported[0]) == figures | {f"reward/{name}" for name in terms}
     for row in reported:
         assert all(np.isfinite(value) for name, value in row.items() if name != "stage")

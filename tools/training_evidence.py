@@ -22,7 +22,7 @@ from gaitshift.gait_analysis import FIRST_GAITS
 from gaitshift.reproduction.plan import Job
 from gaitshift.reproduction.pool import train_all
 from gaitshift.reproduction.settings import Setting
-from gaitshift.reward import ADDITIONS
+from gaitshift.reward import ADDITIONS, BONUS_SHARES
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.training.recipe import Recipe
 from gaitshift.training.run import POLICY
@@ -45,10 +45,10 @@ This page is made by `python tools/training_evidence.py seeds`.
 ADDITIONS_HEAD = """# The additions to Table I, taken away
 
 Trot on the flat stage of the default recipe ({iterations} iterations), whole and without each of
-the seven terms that the reward adds to the paper's Table I (`gaitshift.reward.ADDITIONS`): means
-over three seeds, each policy judged on flat ground, 64 robots for 12 s. Clean: how many of the
-three keep all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a
-cycle.
+the seven terms that the reward adds to the paper's Table I and of the two manners of a change that
+the bonus depends on (`gaitshift.reward.ADDITIONS`, `BONUS_SHARES`): means over three seeds, each
+policy judged on flat ground, 64 robots for 12 s. Clean: how many of the three keep all limits of
+`gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
 This page is made by `python tools/training_evidence.py additions`.
 """
 
@@ -128,7 +128,7 @@ def write_seeds(processes: int) -> Path:
 
 def write_additions(processes: int) -> Path:
     """The table of additions taken away."""
-    settings = [setting(), *(setting(name) for name in ADDITIONS)]
+    settings = [setting(), *(setting(name) for name in (*ADDITIONS, *BONUS_SHARES))]
     jobs = jobs_of(settings, (ABLATED,), ABLATION_SEEDS)
     figures = judged(jobs, processes)
     head = ("without", "clean", "survival", "speed [m/s]", "pattern", "worst touchdowns")

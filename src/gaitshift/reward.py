@@ -1,4 +1,4 @@
-"""The reward: Table I term by term, seven additions of ours, and the machine's bonus."""
+"""The reward: Table I term by term, additions of ours, and the machine's bonus."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -26,6 +26,9 @@ ADDITIONS = (
     "action_rate",
 )
 """The terms that are ours; every other one is Table I's."""
+
+BONUS_SHARES = ("bonus_swing", "bonus_punctuality")
+"""What makes the bonus depend on how a change came about; ours."""
 
 RewardTerms = dict[str, Float[np.ndarray, " N"]]
 """The weighted terms of R_walk by name, each (N,)."""
@@ -68,6 +71,12 @@ class RewardConfig:
     """Times ‖a - a_last‖²; ours: smooth targets."""
     bonus: float = 200.0
     """b, paid when the machine changes its state (paper III-C)."""
+    bonus_swing: float = 1.0
+    """Share of the bonus that is paid by the height of the swing alone, times the environment's
+    strictness; ours: without it feet drag."""
+    bonus_punctuality: float = 1.0
+    """Share of the bonus that is paid for being on time alone, times the environment's strictness;
+    ours: a stride follows its commanded frequency, and its halves are of one length."""
     bonus_mode: BonusMode = "add"
     """How b meets R_walk; ours is `add`, because `multiply` punishes a good change while R_walk is
     negative (docs/paper.md)."""
@@ -81,7 +90,7 @@ class RewardConfig:
     @classmethod
     def paper(cls, bonus_mode: BonusMode = "add") -> "RewardConfig":
         """Table I and b = 200 alone."""
-        return cls(**dict.fromkeys(ADDITIONS, 0.0), bonus_mode=bonus_mode)
+        return cls(**dict.fromkeys((*ADDITIONS, *BONUS_SHARES), 0.0), bonus_mode=bonus_mode)
 
 
 def walk_reward(
@@ -132,6 +141,27 @@ def walk_reward(
         name: penalty_scale * term if getattr(config, name) < 0 else term
         for name, term in terms.items()
     }
+
+
+def earned_bonus(
+    config: RewardConfig,
+    bonus: Float[np.ndarray, " N"],
+    *,
+    swing_share: Float[np.ndarray, " N"],
+    on_time: Float[np.ndarray, " N"],
+    strictness: float,
+) -> Float[np.ndarray, " N"]:
+    """The edges' factors of the bonus, in the part that the manner of the change has earned.
+
+    Args:
+        config: the weights.
+        bonus: the edge's own factor, 0 where the machine stayed.
+        swing_share: share of the swing height that was reached, in [0, 1].
+        on_time: punctuality of the change, in [0, 1].
+        strictness: how much of both is asked for, in [0, 1].
+    """
+    swing = 1.0 - strictness * config.bonus_swing * (1.0 - swing_share)
+    return bonus * swing * (1.0 - strictness * config.bonus_punctuality * (1.0 - on_time))
 
 
 def with_bonus(

@@ -15,7 +15,7 @@ from gaitshift.env.config import EnvConfig
 from gaitshift.env.swings import Swings
 from gaitshift.motion import Motion
 from gaitshift.observation import Observation, Situation
-from gaitshift.reward import walk_reward, with_bonus
+from gaitshift.reward import earned_bonus, walk_reward, with_bonus
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B, Robot
 from gaitshift.terrain import Terrain
@@ -53,7 +53,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
         self.strictness = 1.0
         """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
-        depends on the height of the swing, and factor on the price of chatter."""
+        depends on swing heights and punctuality, and factor on the price of chatter."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.penalty_scale = 1.0
@@ -90,12 +90,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         self.world.push(self._pusher.step())
         motion = self.world.step(self._stance + self.robot.action_scale * action)
-        step = self.machine.step(
-            self._state,
-            motion.contact,
-            self._steps_in_state,
-            dwell=self.machine.dwell_for(self._command.stride),
-        )
+        dwell = self.machine.dwell_for(self._command.stride)
+        step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
+        on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
         chatter, swing_share = self._swings.see(self._state, step, motion)
         self._state = step.state
         self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
@@ -110,7 +107,13 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             action_change=action - self._last_action,
             penalty_scale=self.penalty_scale,
         )
-        bonus = step.bonus * (1.0 - self.strictness * (1.0 - swing_share))
+        bonus = earned_bonus(
+            self.config.reward,
+            step.bonus,
+            swing_share=swing_share,
+            on_time=on_time,
+            strictness=self.strictness,
+        )
         walk = np.sum(list(terms.values()), axis=0)
         reward = with_bonus(self.config.reward, walk, bonus)
         self._last_action = action
@@ -169,7 +172,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
         rng, config, count = self._rng, self.config, len(ids)
-        yaw = rng.uniform(-np.pi, np.pi, count)
+        yaw = rng.choice((0.0, np.pi), count)  # edges lie across x: up and down, head on
         velocity = np.zeros((count, 3))
         velocity[:, :2] = rng.uniform(-config.velocity_noise, config.velocity_noise, (count, 2))
         noise = rng.uniform(-config.joint_noise, config.joint_noise, (count, 12))

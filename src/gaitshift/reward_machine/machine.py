@@ -28,6 +28,13 @@ class Step(NamedTuple):
     """Multiplier of the shared bonus: δr of the edge where changed, 0 elsewhere."""
 
 
+GRACE = 2
+"""Control steps by which a change may be late and still be on time: ours, contacts take as long."""
+
+LATEST = 0.5
+"""A change later than that by this share of the dwell earns no bonus; ours."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RewardMachine(Definition):
     """A gait as a machine whose states are stance sets and whose edges are steps of the feet.
@@ -106,10 +113,32 @@ class RewardMachine(Definition):
         Arguments are as in `step`. With the state it tells the policy what the lock-out is about:
         the stance is to be held now, or to be changed.
         """
-        rows = self._lookup
+        return np.maximum(self._least_steps(state, dwell) - steps_in_state - 1, 0.0)
+
+    def punctuality(
+        self,
+        state: Int[np.ndarray, " N"],
+        steps_in_state: Int[np.ndarray, " N"],
+        dwell: int | Int[np.ndarray, " N"] | None = None,
+    ) -> Float[np.ndarray, " N"]:
+        """How much of its bonus a change in this step still earns, in [0, 1]. Ours.
+
+        1 until `GRACE` steps after the first edge out of the state may open, 0 when it is later
+        than that by `LATEST` of the dwell, and a straight line in between; 1 where no dwell is
+        asked for. The lock-out forbids a stride above the commanded frequency; this prices one
+        below it, and one whose halves differ. Arguments are as in `step`.
+        """
+        wanted = self._least_steps(state, dwell)
+        late = np.maximum(steps_in_state + 1 - wanted - GRACE, 0.0)
+        share = np.maximum(1.0 - late / (LATEST * np.maximum(wanted, 1.0)), 0.0)
+        return np.where(wanted > 0, share, 1.0)
+
+    def _least_steps(
+        self, state: Int[np.ndarray, " N"], dwell: int | Int[np.ndarray, " N"] | None
+    ) -> Float[np.ndarray, " N"]:
+        """Steps after which the first edge out of the state may open."""
         asked = self.dwell if dwell is None else dwell
-        wanted = np.ceil(rows.least_share[state] * asked - 1e-9)
-        return np.maximum(wanted - steps_in_state - 1, 0.0)
+        return np.ceil(self._lookup.least_share[state] * asked - 1e-9)
 
     def enter(self, contact: Bool[np.ndarray, "N 4"]) -> Int[np.ndarray, " N"]:
         """Return the state to start in: the stance that agrees with the contacts on most feet.

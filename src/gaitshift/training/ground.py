@@ -1,5 +1,7 @@
 """The ground of training: flat, then noise, slopes and stairs drawn anew every few iterations."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from gaitshift.terrain import Terrain, flat, perlin, slope, stairs
@@ -11,12 +13,9 @@ FIELD = 20.0
 FIRST_SHARE = 0.3
 """Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
 
-KINDS = ("flat", "flat", "flat", "perlin", "perlin", "slope", "stair", "step")
+KINDS = ("flat",) * 2 + ("perlin",) * 2 + ("slope",) + ("stair",) * 2 + ("step",) * 3
 """The fields that robots share out at a time; ours: level ground stays among them, or speeds and
 touchdowns that were learned on it get lost."""
-
-STAIR_CELL = 0.05
-"""Distance between samples of stairs [m]; ours: a face leans over one of them."""
 
 RUNS = {"stair": (0.30, 0.50), "step": (1.0, 2.5)}
 """Shortest and longest tread [m]; ours: those of staircases, and room for strides in between."""
@@ -52,12 +51,11 @@ def _draw(kind: str, stage: Stage, grown: float, rng: np.random.Generator) -> Te
         towards = rng.uniform(0.0, 360.0)
         return slope(share * stage.slope, towards=towards, length=FIELD, width=FIELD)
     if kind in RUNS:
-        return stairs(
-            share * getattr(stage, kind),
-            run=rng.uniform(*RUNS[kind]),
-            flight=1000,
-            length=FIELD,
-            width=FIELD,
-            cell=STAIR_CELL,
-        )
+        return _stairs(share * getattr(stage, kind), rng.uniform(*RUNS[kind]))
     return perlin(share * stage.amplitude, seed=rng, length=FIELD, width=FIELD)
+
+
+def _stairs(rise: float, run: float) -> Terrain:
+    """Stairs with faces as steep as those of trials; across them a sample every 10 cm is enough."""
+    strip = stairs(rise, run=run, flight=1000, length=FIELD, width=FIELD / 4)
+    return replace(strip, size=(FIELD, FIELD), origin=(0.0, -FIELD / 2))

@@ -82,11 +82,11 @@ class Recipe:
         Stage(name="flat", iterations=350),
         Stage(
             name="rough",
-            iterations=500,
+            iterations=600,
             amplitude=0.16,
             slope=12.0,
-            stair=0.06,
-            step=0.12,
+            stair=0.07,
+            step=0.14,
             push=130.0,
         ),
     )
