@@ -347,6 +347,33 @@ def test_no_quantity_of_the_observation_is_a_step_late(monkeypatch):
     assert (moving > 1e-4).mean() > 0.8, "a late quantity would show"
 
 
+def test_the_heights_shown_are_those_of_each_foots_last_touch_in_this_episode(monkeypatch):
+    env = hop(3, episode_steps=40)
+    part = env.observe.slices["touch_height"]
+    env.reset(seed=1)
+    motions = keep_motions(env, monkeypatch)
+
+    def heights(motion, robot):
+        return motion.foot_position_w[robot, :, 2] - motion.base_position_w[robot, 2]
+
+    kept = [heights(env.world.motion, robot) for robot in range(3)]
+    ends = 0
+    for action in arbitrary_actions(7, 120, 3, size=1.5):
+        observation, _, terminated, truncated, info = env.step(action)
+        for robot in range(3):
+            for foot in np.flatnonzero(motions[-1].contact[robot]):
+                kept[robot][foot] = heights(motions[-1], robot)[foot]
+            shown = observation[robot, part]
+            if terminated[robot] or truncated[robot]:
+                ends += 1
+                shown = info["final_obs"][robot, part]
+            expected = np.clip(10 * (kept[robot] - kept[robot].mean()), -4, 4)
+            np.testing.assert_allclose(shown, expected, atol=1e-5)
+            if terminated[robot] or truncated[robot]:
+                kept[robot] = heights(env.world.motion, robot)
+    assert ends > 4
+
+
 def test_the_action_shown_and_paid_for_is_the_clipped_one():
     env = hop(1)
     env.reset(seed=0)

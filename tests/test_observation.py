@@ -16,9 +16,11 @@ from gaitshift.observation import (
     PAPER_SLICES,
     Observation,
     Situation,
+    last_touch,
 )
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
+from gaitshift.switching import HeightDifference
 from gaitshift.terrain import flat
 from gaitshift.world import World
 from symmetric import symmetric_robot
@@ -59,8 +61,9 @@ SIZES = {
     "stride_command": 1,
     "wait": 1,
     "last_action": 12,
+    "touch_height": 4,
 }
-"""S × U in the paper's order (III-C), then the commands and the last action."""
+"""S × U in the paper's order (III-C), then the commands, the last action and the paper's h."""
 
 
 def two_robots():
@@ -100,6 +103,7 @@ def two_robots():
         ),
         last_action=np.stack([0.5 * ramp, -ramp]),
         stance=STANCE,
+        touch_height=np.array([[-0.5, -0.48, -0.4, -0.42], [-0.5, -0.5, -0.5, -1.1]]),
     )
 
 
@@ -134,6 +138,8 @@ HAND_TABLE = {
         [0.5, 1, 1.5, 2, 2.5, 3, 3.5, 4, 4.5, 5, 5.5, 6],
         [-1, -2, -3, -4, -5, -6, -7, -8, -9, -10, -11, -12],
     ],
+    # From their means, -0.45 and -0.65 m, in units of 10 cm; the last foot saturates at -4.
+    "touch_height": [[-0.5, -0.3, 0.5, 0.3], [1.5, 1.5, 1.5, -4]],
 }
 
 
@@ -181,8 +187,33 @@ def test_a_robot_is_shown_the_same_alone_as_among_others():
             command=situation.command.of(one),
             last_action=situation.last_action[one],
             stance=STANCE,
+            touch_height=situation.touch_height[one],
         )
         np.testing.assert_array_equal(observe(alone), observe(situation)[one])
+
+
+def test_heights_of_the_last_touch_are_those_that_the_shift_condition_keeps():
+    """Told twice: here from the world, by the condition from the body frame and gravity."""
+    rng, world = np.random.default_rng(5), World(ANYMAL_B, flat(20.0, 20.0), 3, threads=1)
+    condition = HeightDifference(frame="gravity")
+    state, kept = condition.start(3), last_touch(world.motion)
+    np.testing.assert_allclose(kept, world.motion.foot_height)
+    moved = 0
+    for _ in range(150):
+        target = ANYMAL_B.stance_angles + rng.normal(0.0, 0.5, (3, 12))
+        motion, before = world.step(target), kept
+        kept = last_touch(motion, before)
+        state, _ = condition.step(
+            state,
+            contact=motion.contact,
+            foot_position_b=motion.foot_position_b,
+            gravity_b=motion.gravity_b,
+            shifted=np.zeros(3, dtype=bool),
+        )
+        np.testing.assert_allclose(kept[state.touched], state.height[state.touched], atol=1e-9)
+        np.testing.assert_array_equal(kept[~motion.contact], before[~motion.contact])
+        moved += np.count_nonzero(~motion.contact & (motion.foot_height != kept))
+    assert moved > 100, "feet swing and are remembered where they stood"
 
 
 def test_an_unknown_slice_is_refused_with_those_there_are():
@@ -230,6 +261,7 @@ def test_the_mirrored_observation_is_the_observation_of_the_mirrored_motion(gait
         last_action=abduction * seen.last_action[:, [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]],
         # Only a stance that is its own mirror image can be the stance of both.
         stance=np.zeros(12),
+        touch_height=seen.touch_height[:, [1, 0, 3, 2]],
     )
     upright = replace(seen, stance=np.zeros(12))
     order, signs = observe.mirror
@@ -276,12 +308,13 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
     steps_in_state = np.zeros(2 * robots, dtype=int)
     action = np.zeros((2 * robots, 12))
     turn, frequency = rng.uniform(-0.5, 0.5, robots), rng.uniform(1.5, 3.0, robots)
-    seen = []
+    seen, touch_height = [], last_touch(world.motion)
     for _ in range(steps):
         action = joint_pair(0.8 * action[:robots] + 0.15 * rng.normal(size=(robots, 12)))
         motion = world.step(stance + robot.action_scale * action)
         state, changed, *_ = QUICK_TROT.step(state, motion.contact, steps_in_state)
         steps_in_state = np.where(changed, 0, steps_in_state + 1)
+        touch_height = last_touch(motion, touch_height)
         situation = Situation(
             machine_state=state,
             steps_in_state=steps_in_state,
@@ -293,6 +326,7 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
             ),
             last_action=action,
             stance=stance,
+            touch_height=touch_height,
         )
         seen.append(observe(situation))
     seen = np.stack(seen)

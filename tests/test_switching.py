@@ -250,6 +250,7 @@ def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_act
         command=command.of(np.array([1])),
         last_action=(first[1:] - STANCE) / ANYMAL_B.action_scale,
         stance=STANCE,
+        touch_height=motion.foot_height[1:],
     )
     expected = bound.target(bound(bound.observation(shown)))
     np.testing.assert_allclose(driver.act(motion, command)[1:], expected, atol=1e-6)

@@ -85,6 +85,14 @@ class Motion:
         return np.einsum("nij,nli->nlj", self.rotation_wb, offset)
 
     @cached_property
+    def foot_height(self) -> Float[np.ndarray, "N 4"]:
+        """Height of each foot's lowest point above the base origin, along the vertical [m].
+
+        Negative while it is below. Joints and attitude are enough for a robot to compute it.
+        """
+        return self.foot_position_w[..., 2] - self.base_position_w[:, 2:]
+
+    @cached_property
     def base_height(self) -> Float[np.ndarray, " N"]:
         """Height z of the base origin above the lowest foot [m].
 

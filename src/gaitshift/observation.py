@@ -1,7 +1,8 @@
 """The observation S × U as named slices (paper III-D), and its mirror image.
 
 The paper's S is (u, δ, q, q̇, z, φ, v, ω, f). `PAPER_SLICES` is exactly that; `DEFAULT_SLICES` adds
-the command and the last action, which the default reward speaks of.
+the command and the last action, which the default reward speaks of, and the heights at which the
+feet last touched, by which a policy knows rough ground from flat.
 """
 
 from collections.abc import Callable
@@ -30,6 +31,20 @@ class Situation:
     """The action that led here, zero after a reset."""
     stance: Float[np.ndarray, " 12"]
     """The robot's default joint angles [rad]."""
+    touch_height: Float[np.ndarray, "N 4"]
+    """Height of each foot from the base when it last touched [m], as `last_touch` keeps it."""
+
+
+def last_touch(
+    motion: Motion, before: Float[np.ndarray, "N 4"] | None = None
+) -> Float[np.ndarray, "N 4"]:
+    """Height of each foot from the base when it last touched, along the vertical [m].
+
+    The paper's h (III-E), which the shift condition watches, as something the policy sees too.
+    `before` is what it was a step ago; None: every foot is taken as it stands now.
+    """
+    height = motion.foot_height
+    return height.copy() if before is None else np.where(motion.contact, height, before)
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,15 @@ JOINT_MIRROR = (_JOINT_ORDER, _JOINT_SIGNS)
 
 STEP_SCALE = 0.05
 """δ is shown in units of 20 control steps and saturates at 5 units: ours, to keep inputs near 1."""
+
+
+TOUCH_SCALE = 10.0
+"""Differences of touch heights are shown in units of 10 cm and saturate at 4 units: ours."""
+
+
+def _touch_differences(s: Situation) -> np.ndarray:
+    difference = s.touch_height - s.touch_height.mean(axis=1, keepdims=True)
+    return np.clip(TOUCH_SCALE * difference, -4.0, 4.0)
 
 
 def _machine_slice(machine: RewardMachine) -> _Slice:
@@ -85,6 +109,7 @@ _SLICES: dict[str, _Slice] = {
     "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
     "stride_command": _column(lambda s: STEP_SCALE * s.command.stride),
     "last_action": _Slice(12, lambda s: s.last_action, JOINT_MIRROR),
+    "touch_height": _Slice(4, _touch_differences, (MIRRORED_LEGS, (1,) * 4)),
 }
 
 _MACHINE_SLICES = {"machine_state": _machine_slice, "wait": _wait_slice}
@@ -110,6 +135,7 @@ DEFAULT_SLICES = (
     "stride_command",
     "wait",
     "last_action",
+    "touch_height",
 )
 
 

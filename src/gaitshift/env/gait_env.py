@@ -14,7 +14,7 @@ from gaitshift.command import ACTION_LIMIT, CONTROL_PERIOD, Command
 from gaitshift.env.config import EnvConfig
 from gaitshift.env.swings import Swings
 from gaitshift.motion import Motion
-from gaitshift.observation import Observation, Situation
+from gaitshift.observation import Observation, Situation, last_touch
 from gaitshift.reward import earned_bonus, walk_reward, with_bonus
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B, Robot
@@ -94,6 +94,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
         on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
         chatter, swing_share = self._swings.see(self._state, step, motion)
+        self._touch_height = last_touch(motion, self._touch_height)
         self._state = step.state
         self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
         agreement = self.machine.agreement(self._state, motion.contact)
@@ -154,6 +155,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._state: Int[np.ndarray, " N"] = np.full(n, self.machine.initial)
         self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._swings = Swings(self.machine, n)
+        self._touch_height: Float[np.ndarray, "N 4"] = np.zeros((n, 4))
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._line: Float[np.ndarray, " N"] = np.zeros(n)
@@ -187,6 +189,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._state[ids] = self.machine.initial
         self._steps_in_state[ids] = 0
         self._swings.restart(ids)
+        self._touch_height[ids] = last_touch(self.world.motion)[ids]
         self._age[ids] = 0
         self._last_action[ids] = 0.0
         self._line[ids] = self._heading[ids] = yaw
@@ -275,5 +278,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
                 command=self._command,
                 last_action=self._last_action,
                 stance=self._stance,
+                touch_height=self._touch_height,
             )
         )

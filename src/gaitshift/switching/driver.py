@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Int
 from gaitshift.command import ACTION_LIMIT, Command
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
-from gaitshift.observation import Situation
+from gaitshift.observation import Situation, last_touch
 from gaitshift.policy import Policy
 from gaitshift.robot import Robot
 
@@ -31,6 +31,7 @@ class Driver:
         self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
+        self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
         self.machine_state[:] = self._machines[self.gaits.index(start)].initial
 
     @property
@@ -48,6 +49,7 @@ class Driver:
 
         `command` is the one that the robots acted on.
         """
+        self._touch_height = last_touch(motion, self._touch_height)
         stride = command.stride
         for index, ids in self._groups():
             step = self._machines[index].step(
@@ -71,6 +73,8 @@ class Driver:
     def act(self, motion: Motion, command: Command) -> Float[np.ndarray, "N 12"]:
         """Joint targets [rad] for the next control step."""
         target = np.empty((self.n, 12))
+        if self._touch_height is None:
+            self._touch_height = last_touch(motion)
         for index, ids in self._groups():
             policy = self.policies[self.gaits[index]]
             whole = len(ids) == self.n
@@ -81,6 +85,7 @@ class Driver:
                 command=command if whole else command.of(ids),
                 last_action=self._last_action[ids],
                 stance=policy.robot.stance_angles,
+                touch_height=self._touch_height[ids],
             )
             action = policy(policy.observation(situation)).astype(np.float64)
             action = np.clip(action, -ACTION_LIMIT, ACTION_LIMIT)
