@@ -13,7 +13,7 @@ FIELD = 20.0
 FIRST_SHARE = 0.3
 """Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
 
-KINDS = ("flat",) * 2 + ("perlin",) * 2 + ("slope",) + ("stair",) * 2 + ("step",) * 3
+KINDS = ("flat",) * 4 + ("perlin",) * 2 + ("slope", "stair", "step")
 """The fields that robots share out at a time; ours: level ground stays among them, or speeds and
 touchdowns that were learned on it get lost."""
 

@@ -55,10 +55,10 @@ class Learner:
             "learning_rate": self.ppo.learning_rate,
         }
 
-    def settle(self, factor: float) -> None:
-        """Sets the divergence that updates aim at, and the entropy bonus, to a part of theirs."""
-        self.ppo.desired_kl = factor * self.recipe.ppo.desired_kl
-        self.ppo.entropy_coef = factor * self.recipe.ppo.entropy
+    def aim(self, *, desired_kl: float, entropy: float) -> None:
+        """Sets factors on the divergence that updates aim at, and on the entropy bonus."""
+        self.ppo.desired_kl = desired_kl * self.recipe.ppo.desired_kl
+        self.ppo.entropy_coef = entropy * self.recipe.ppo.entropy
 
     def _collect(self, statistics: "_Statistics") -> None:
         ppo, scale = self.ppo, self.recipe.ppo.reward_scale

@@ -63,6 +63,8 @@ class Stage:
     """Iterations between two draws of the ground (paper III-D)."""
     push: float = 0.0
     """Largest push on the base [N]."""
+    kl_factor: float = 1.0
+    """Factor on PPO's `desired_kl`; ours: on rough ground larger steps come further."""
 
     @property
     def is_rough(self) -> bool:
@@ -82,12 +84,13 @@ class Recipe:
         Stage(name="flat", iterations=350),
         Stage(
             name="rough",
-            iterations=600,
+            iterations=500,
             amplitude=0.16,
             slope=12.0,
-            stair=0.07,
-            step=0.14,
+            stair=0.06,
+            step=0.12,
             push=130.0,
+            kl_factor=2.0,
         ),
     )
     """Flat ground, then Perlin ground with pushes (paper III-D)."""

@@ -167,7 +167,8 @@ class Run:
         env.strictness = self.recipe.strictness(self.iteration)
         env.command_scale = self.recipe.command_scale(self.iteration)
         env.penalty_scale = self.recipe.penalty_scale(self.iteration)
-        self.learner.settle(self.recipe.settling(self.iteration))
+        settling = self.recipe.settling(self.iteration)
+        self.learner.aim(desired_kl=stage.kl_factor * settling, entropy=settling)
         if self._is_checkpoint():
             self.learner.start_episodes(_seed_at(self.seed, self.iteration))
         seen = self.learner.iterate()
