@@ -9,6 +9,7 @@ import torch
 
 from gaitshift import gaits
 from gaitshift.env import EnvConfig, GaitEnv
+from gaitshift.observation import last_touch
 from gaitshift.robot import ANYMAL_B
 from gaitshift.terrain import flat
 from gaitshift.training.learner import Learner, as_tensors
@@ -83,6 +84,7 @@ def twins(gait, robot, *, steps=STEPS):
         joint_position=pair(joints, mirrored_joints(joints)),
         base_velocity_w=pair(velocity, ACROSS * velocity),
     )
+    env._touch_height = last_touch(env.world.motion)
     env._heading = pair(heading, -heading)
     env._state = pair(np.zeros(ROBOTS, dtype=int), np.full(ROBOTS, MIRRORED[gait][0]))
     env._command = replace(
