@@ -692,8 +692,7 @@ def test_a_machine_that_accepts_ends_the_episode_with_its_bonus_and_without_a_fa
             "transition": [{"from": "standing", "to": "done", "down": ["BR"], "up": ["FL"]}],
         }
     )
-    reward_of = RewardConfig(bonus_punctuality=0.0)
-    config = EnvConfig(velocity_noise=0.0, joint_noise=0.0, reward=reward_of)
+    config = EnvConfig(velocity_noise=0.0, joint_noise=0.0)
     env = GaitEnv(tick_off, FLAT, 2, config=config, threads=1)
     env.reset(seed=0)
     motions = keep_motions(env, monkeypatch)

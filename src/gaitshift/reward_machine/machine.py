@@ -11,6 +11,12 @@ from gaitshift.legs import LABEL_COUNT, label_of
 from gaitshift.reward_machine.definition import Definition
 from gaitshift.reward_machine.lookup import Lookup
 
+GRACE = 2
+"""Control steps by which a change may be late and still be on time: ours, contacts take as long."""
+
+LATEST = 0.5
+"""A change later than that by this share of the dwell earns no bonus; ours."""
+
 
 class Step(NamedTuple):
     """What one step did to N machines."""
@@ -26,13 +32,6 @@ class Step(NamedTuple):
 
     bonus: Float[np.ndarray, " N"]
     """Multiplier of the shared bonus: δr of the edge where changed, 0 elsewhere."""
-
-
-GRACE = 2
-"""Control steps by which a change may be late and still be on time: ours, contacts take as long."""
-
-LATEST = 0.5
-"""A change later than that by this share of the dwell earns no bonus; ours."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,9 +124,12 @@ class RewardMachine(Definition):
 
         1 until `GRACE` steps after the first edge out of the state may open, 0 when it is later
         than that by `LATEST` of the dwell, and a straight line in between; 1 where no dwell is
-        asked for. The lock-out forbids a stride above the commanded frequency; this prices one
-        below it, and one whose halves differ. Arguments are as in `step`.
+        asked for, and in a machine that accepts: a task has no stride. The lock-out forbids a
+        stride above the commanded frequency; this prices one below it, and one whose halves
+        differ. Arguments are as in `step`.
         """
+        if self.accepting:
+            return np.ones(len(state))
         wanted = self._least_steps(state, dwell)
         late = np.maximum(steps_in_state + 1 - wanted - GRACE, 0.0)
         share = np.maximum(1.0 - late / (LATEST * np.maximum(wanted, 1.0)), 0.0)
