@@ -141,6 +141,22 @@ def test_touchdowns_are_held_against_those_the_machine_asks_for():
 # Steps and phases ---------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("left_over", [0, 10, 20, 30])
+def test_duty_factors_are_those_of_whole_cycles_however_the_log_ends(left_over):
+    """With half a cycle left over, 3.5 of them have the one diagonal down for 4 halves of 7."""
+    log = trotting(speed=0.9, period=40, steps=200 + 120 + left_over, fallen_from=0)
+    figures = measure(log, {"trot": TROT}, mass=20.0)
+    assert figures["duty_factor"] == [0.5] * 4
+
+
+def test_feet_of_a_robot_that_walks_no_cycle_are_down_for_their_share_of_the_time():
+    contact = np.zeros((400, 1, 4), dtype=bool)
+    contact[:, :, 0] = True
+    contact[300:, :, 1] = True
+    figures = measure(log_of(contact), {"trot": TROT}, mass=20.0)
+    assert figures["duty_factor"] == [1.0, 0.5, 0.0, 0.0]
+
+
 def test_bounces_are_stance_and_stubs_are_swing_but_the_ends_stay():
     """At 100 Hz: gaps under 6 steps close, then contacts under 3 steps go."""
     text = "1..........111.....111......11..........1111......1"

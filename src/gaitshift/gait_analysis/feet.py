@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from gaitshift.gait_analysis.base import Figure
 from gaitshift.gait_analysis.phase import Phases, axial_of
@@ -20,6 +20,7 @@ def feet_figures(
     """What `measure` says of feet and machines."""
     steps, contact = sample.steps, sample.contact
     cycles = sample.entries(machines)
+    whole = _whole_cycles(cycles)
     machine = machines[sample.gait()]
     phases = Phases.of(sample.touchdowns, sample.period)
     moments = phases.moments(axial_of(machine))
@@ -29,10 +30,10 @@ def feet_figures(
         "slip": _slip(sample),
         "pattern_fraction": float(sample.log.stance_shown[sample.alive].mean()) if steps else None,
         "cycles_per_s": float(cycles.sum() / (steps * sample.period)) if steps else None,
-        "touchdowns_per_cycle": _touchdowns_per_cycle(sample, machines),
+        "touchdowns_per_cycle": _touchdowns_per_cycle(sample, machines, cycles, whole),
         "phase": _where(known, phase),
         "phase_consistency": _where(known, np.abs(moments)),
-        "duty_factor": (contact.sum(axis=(0, 1)) / steps).tolist() if steps else None,
+        "duty_factor": _duty_factor(sample, whole) if steps else None,
         "clearance": [_clearance(sample, leg) for leg in range(4)],
         "flight_fraction": float((sample.alive & ~contact.any(axis=2)).sum() / steps)
         if steps
@@ -44,19 +45,34 @@ def _where(known: list[bool], values: Float[np.ndarray, " 4"]) -> list[Figure]:
     return [float(value) if there else None for there, value in zip(known, values, strict=True)]
 
 
-def _touchdowns_per_cycle(sample: Sample, machines: Mapping[str, RewardMachine]) -> PerFoot:
-    """Onsets over what whole cycles ask for: of each robot from its first to its last entry.
+def _whole_cycles(entry: Bool[np.ndarray, "T N"]) -> Bool[np.ndarray, "T N"]:
+    """Where each robot is between its first and its last entry into a cycle.
 
     Over the whole time half a cycle at either end would count on one side alone.
     """
-    entry = sample.entries(machines)
     before = entry.cumsum(axis=0) - entry
-    inside = (before >= 1) & (before < entry.sum(axis=0))
-    counts = np.bincount(sample.log.gait[entry & inside], minlength=len(sample.log.gaits))
+    return (before >= 1) & (before < entry.sum(axis=0))
+
+
+def _touchdowns_per_cycle(
+    sample: Sample,
+    machines: Mapping[str, RewardMachine],
+    entry: Bool[np.ndarray, "T N"],
+    whole: Bool[np.ndarray, "T N"],
+) -> PerFoot:
+    """Onsets over what whole cycles ask for."""
+    counts = np.bincount(sample.log.gait[entry & whole], minlength=len(sample.log.gaits))
     expected = counts @ np.array([machines[name].touchdowns for name in sample.log.gaits])
     if not expected.all():
         return None
-    return ((sample.onsets & inside[..., None]).sum(axis=(0, 1)) / expected).tolist()
+    return ((sample.onsets & whole[..., None]).sum(axis=(0, 1)) / expected).tolist()
+
+
+def _duty_factor(sample: Sample, whole: Bool[np.ndarray, "T N"]) -> list[float]:
+    """Share of the steps of whole cycles, of all steps where there is no cycle."""
+    taken = whole if whole.any() else sample.alive
+    down = (sample.contact & taken[..., None]).sum(axis=(0, 1))
+    return (down / taken.sum()).tolist()
 
 
 def _clearance(sample: Sample, leg: int) -> Figure:

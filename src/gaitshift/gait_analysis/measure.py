@@ -36,7 +36,7 @@ def measure(
       asks for, in whole cycles: 1 where no foot bounces, also where it comes down twice a cycle.
     - `phase` (4,) [stride of FL], `phase_consistency` (4,): circular mean and resultant length of
       touchdowns within the strides of FL (`phase.Phases`), 0 and 1 for FL itself.
-    - `duty_factor` (4,): share of steps each foot is down.
+    - `duty_factor` (4,): share of the time of whole cycles that each foot is down.
     - `clearance` (4,) [m]: median over strides of the highest that the sole is above the ground.
     - `flight_fraction`: share of steps with no foot down.
     - `lateral_error_p95` [m]: 95th percentile of the distance from the line, at the end.
