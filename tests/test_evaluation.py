@@ -19,7 +19,7 @@ from gaitshift.evaluation import (
 )
 from gaitshift.log import Log
 from gaitshift.reward_machine import RewardMachine
-from gaitshift.switching import Driver, HeightDifference, Scheduled
+from gaitshift.switching import Condition, Driver, Scheduled
 from gaitshift.terrain import flat, from_spec
 from gaitshift.training.export import describe, export
 from gaitshift.training.learner import Learner
@@ -145,7 +145,7 @@ def test_the_demo_shifts_to_the_rough_gait_on_rough_ground_and_back_after_it() -
         assert shifts == [("trot", "bound"), ("bound", "trot")]
         assert 4.0 < summary["switches"][0]["x_m"] < 12.0 < summary["switches"][1]["x_m"] + 0.75
         # Six pairs count at most in the step that carries k over β.
-        assert 0 < summary["switches"][0]["k"] - HeightDifference().beta <= 6
+        assert 0 < summary["switches"][0]["k"] - Condition().beta <= 6
     assert log.qpos.shape[1] == 4
 
 

@@ -20,6 +20,7 @@ ON_A_ROBOT = (
     "policy",
     "switching",
     "switching.height_difference",
+    "switching.graph",
 )
 """Modules that go onto a robot, where NumPy, onnxruntime and jaxtyping are all there is."""
 
@@ -72,20 +73,19 @@ def test_condition_and_machine_work_where_they_are_all_there_is():
     program = """
 import numpy as np
 from gaitshift import gaits
-from gaitshift.switching import HeightDifference
-condition = HeightDifference(alpha=0.05, beta=11.0, frame="gravity")
+from gaitshift.switching import Condition, Signals
+condition = Condition(alpha=0.05, beta=11.0)
 state = condition.start(1)
 feet = np.zeros((1, 4, 3))
 feet[0, :, 2] = (-0.5, -0.5, -0.4, -0.4)  # four pairs of six differ by 0.1 m
 fired = []
 for _ in range(4):
-    state, fire = condition.step(
-        state,
+    signals = Signals(
         contact=np.ones((1, 4), dtype=bool),
         foot_position_b=feet,
         gravity_b=np.array([[0.0, 0.0, -1.0]]),
-        shifted=np.zeros(1, dtype=bool),
     )
+    state, fire = condition.step(state, signals, np.zeros(1, dtype=bool))
     fired.append(bool(fire[0]))
 print(fired, gaits.load("trot").enter(np.array([[False, True, True, False]])))
 """

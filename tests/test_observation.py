@@ -20,7 +20,7 @@ from gaitshift.observation import (
 )
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
-from gaitshift.switching import HeightDifference
+from gaitshift.switching import HeightDifference, Signals
 from gaitshift.terrain import flat
 from gaitshift.world import World
 from symmetric import symmetric_robot
@@ -196,21 +196,16 @@ def test_heights_of_the_last_touch_are_those_that_the_shift_condition_keeps():
     """Told twice: here from the world, by the condition from the body frame and gravity."""
     rng, world = np.random.default_rng(5), World(ANYMAL_B, flat(20.0, 20.0), 3, threads=1)
     condition = HeightDifference(frame="gravity")
-    state, kept = condition.start(3), last_touch(world.motion)
+    height, kept = condition.start(3), last_touch(world.motion)
     np.testing.assert_allclose(kept, world.motion.foot_height)
     moved = 0
     for _ in range(150):
         target = ANYMAL_B.stance_angles + rng.normal(0.0, 0.5, (3, 12))
         motion, before = world.step(target), kept
         kept = last_touch(motion, before)
-        state, _ = condition.step(
-            state,
-            contact=motion.contact,
-            foot_position_b=motion.foot_position_b,
-            gravity_b=motion.gravity_b,
-            shifted=np.zeros(3, dtype=bool),
-        )
-        np.testing.assert_allclose(kept[state.touched], state.height[state.touched], atol=1e-9)
+        height, _ = condition.step(height, Signals.from_motion(motion))
+        touched = ~np.isnan(height)
+        np.testing.assert_allclose(kept[touched], height[touched], atol=1e-9)
         np.testing.assert_array_equal(kept[~motion.contact], before[~motion.contact])
         moved += np.count_nonzero(~motion.contact & (motion.foot_height != kept))
     assert moved > 100, "feet swing and are remembered where they stood"

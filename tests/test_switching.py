@@ -14,7 +14,7 @@ from gaitshift.motion import Motion
 from gaitshift.observation import Situation
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
-from gaitshift.switching import Autonomous, Driver, HeightDifference, Scheduled, Switcher
+from gaitshift.switching import Autonomous, Condition, Driver, GaitGraph, Scheduled, Switcher
 from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
 from gaitshift.training.learner import Learner
@@ -340,9 +340,7 @@ def test_policies_for_different_gains_cannot_be_shifted_between(policies, tmp_pa
 
 # The autonomous switcher ------------------------------------------------------------------------
 
-CONDITION = HeightDifference(
-    alpha=0.05, beta=7.0, epsilon=1.0, alpha_back=0.03, beta_back=3.0, frame="gravity"
-)
+CONDITION = Condition(alpha=0.05, beta=7.0, epsilon=1.0, alpha_back=0.03, beta_back=3.0)
 LEVEL, ONE_UP, TWO_UP = [0.0, 0.01, 0.02, 0.0], [0.0, 0.1, 0.0, 0.0], [0.1, 0.1, 0.0, 0.0]
 """Feet on ground of pairs none, three and four of which differ by more than α."""
 TIMELINE = [
@@ -367,7 +365,7 @@ TIMELINE = [
 def walk_the_timeline(policies):
     """Gaits and decisions of two robots along TIMELINE."""
     driver = Driver(policies, 2, start="trot")
-    switcher = Autonomous(CONDITION, 2, flat="trot", rough="bound")
+    switcher = Autonomous(GaitGraph.of(CONDITION, flat="trot", rough="bound"), 2)
     for step, row in enumerate(TIMELINE):
         motion = motion_of(["FL FR BL BR"] * 2, np.array([row[0], row[4]]))
         driver.see(motion, driver.own_command())
@@ -400,7 +398,7 @@ def test_a_shift_begins_the_new_machine_anew(policies):
 
 def test_one_gait_for_flat_and_rough_is_refused():
     with pytest.raises(GaitshiftError, match="are both 'trot'"):
-        Autonomous(CONDITION, 1, flat="trot", rough="trot")
+        GaitGraph.of(CONDITION, flat="trot", rough="trot")
 
 
 # The schedule -----------------------------------------------------------------------------------
@@ -438,12 +436,12 @@ def test_a_schedule_has_no_counter_to_tell(policies):
 
 
 def test_both_switchers_are_switchers():
-    assert isinstance(Autonomous(CONDITION, 1, flat="trot", rough="pace"), Switcher)
+    assert isinstance(Autonomous(GaitGraph.of(CONDITION, flat="trot", rough="pace"), 1), Switcher)
     assert isinstance(Scheduled(()), Switcher)
 
 
 def test_a_condition_of_other_numbers_is_another_condition(policies):
     driver = Driver(policies, 1, start="trot")
-    switcher = Autonomous(replace(CONDITION, beta=2.0), 1, flat="trot", rough="bound")
+    switcher = Autonomous(GaitGraph.of(replace(CONDITION, beta=2.0), flat="trot", rough="bound"), 1)
     switcher.step(0.01, motion_of(["FL FR BL BR"], np.array([ONE_UP])), driver)
     assert gaits_of(driver) == ["bound"], "3 > 2 at the first step"

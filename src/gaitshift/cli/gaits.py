@@ -9,6 +9,7 @@ import tyro
 from gaitshift import gaits, policy
 from gaitshift.cli.output import check_folder, emit_json, say
 from gaitshift.reward_machine import RewardMachine, draw, mermaid
+from gaitshift.switching import GaitGraph
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -17,6 +18,8 @@ class Gaits:
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
     """A gait by its name, or a machine file ending in .toml; all shipped gaits by default."""
+    graph: str = ""
+    """A gait graph, by its name or a file ending in .toml: checked, and printed as Mermaid."""
     out: Path | None = None
     """Draw each machine as a picture and a Mermaid file into this folder."""
     overwrite: bool = False
@@ -26,6 +29,11 @@ class Gaits:
 
     def run(self) -> None:
         """Prints, and draws."""
+        if self.graph:
+            graph = GaitGraph.load(self.graph)
+            drawn = graph.mermaid()
+            emit_json({"gaits": graph.gaits, "mermaid": drawn}) if self.json else print(drawn)
+            return
         names = gaits.names() if self.gait is None else (self.gait,)
         machines = [gaits.load(name) for name in names]
         files = tuple(f"{m.name}{ending}" for m in machines for ending in (".png", ".mmd"))

@@ -1,7 +1,7 @@
 """The demonstration: a robot that crosses a track and shifts its gait itself, or on a schedule."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -11,7 +11,14 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.log import Log
 from gaitshift.policy import Policy
-from gaitshift.switching import Autonomous, Driver, HeightDifference, Scheduled, Switcher
+from gaitshift.switching import (
+    Autonomous,
+    Driver,
+    GaitGraph,
+    Scheduled,
+    Switcher,
+    load_condition,
+)
 from gaitshift.terrain import Terrain, from_spec
 from gaitshift.world import World
 
@@ -35,8 +42,23 @@ class DemoConfig:
     """The gait on flat ground, and at the start."""
     rough_gait: str = "bound"
     """The gait on rough ground."""
-    condition: HeightDifference = field(default_factory=HeightDifference)
-    """When to shift."""
+    condition: str = "height_difference"
+    """When to shift, by name: the foot heights, `paper` for its own setting, or a rival."""
+    alpha: float | None = None
+    """α: above it counts as rough [m, for the foot heights]; the condition's own by default."""
+    beta: float | None = None
+    """β: shift to the rough gait when k exceeds it [counts]."""
+    leak: float | None = None
+    """What k loses in each step [counts]."""
+    alpha_back: float | None = None
+    """α': all below it counts as flat [as α]."""
+    beta_back: float | None = None
+    """β': shift back when k exceeds it [counts]."""
+    hold: float | None = None
+    """Least time in either gait [s]."""
+    graph: str = ""
+    """A gait graph in place of the two gaits and their condition: a shipped one by name, or a
+    TOML file."""
     gaits: tuple[str, ...] = ()
     """Gaits to show in a row instead, on a schedule and without the condition."""
     every: float = 3.0
@@ -74,8 +96,16 @@ class DemoConfig:
     @property
     def used(self) -> tuple[str, ...]:
         """The gaits that appear, each once, the first first."""
-        shown = self.gaits or (self.flat_gait, self.rough_gait)
-        return tuple(dict.fromkeys(shown))
+        return tuple(dict.fromkeys(self.gaits)) or self.ways.gaits
+
+    @property
+    def ways(self) -> GaitGraph:
+        """The gait graph that the robots shift by; `GaitshiftError` where it cannot be had."""
+        if self.graph:
+            return GaitGraph.load(self.graph)
+        numbers = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
+        condition = load_condition(self.condition, **{k: getattr(self, k) for k in numbers})
+        return GaitGraph.of(condition, flat=self.flat_gait, rough=self.rough_gait)
 
 
 def run_demo(
@@ -140,9 +170,7 @@ def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
 def _switcher(config: DemoConfig) -> Switcher:
     if config.gaits:
         return Scheduled(tuple(zip(config.shift_times, config.gaits[1:], strict=True)))
-    return Autonomous(
-        config.condition, config.episodes, flat=config.flat_gait, rough=config.rough_gait
-    )
+    return Autonomous(config.ways, config.episodes)
 
 
 def _ground(config: DemoConfig, seed: int) -> Terrain:

@@ -92,6 +92,9 @@ def run_policy(
     start = np.zeros((config.episodes, 2))
     # Spread over the width, so that robots on one field do not walk over the same ground.
     start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, config.episodes)
+    # Spread over a stride, so that robots meet an edge at all instants of it.
+    stride = policy.info.forward_speed / policy.info.stride_frequency
+    start[:, 0] = rng.uniform(-stride / 2, stride / 2, config.episodes)
     return rollout(world, driver, run, start_xy=start, rng=rng, finish_x=finish_x, report=report)
 
 

@@ -6,6 +6,16 @@ from gaitshift.reward_machine.machine import RewardMachine, Step
 from gaitshift.reward_machine.mermaid import mermaid
 from gaitshift.reward_machine.picture import draw
 from gaitshift.reward_machine.state import State
-from gaitshift.reward_machine.toml_file import read_toml
+from gaitshift.reward_machine.toml_file import read_toml, tables_in
 
-__all__ = ["Edge", "Guard", "RewardMachine", "State", "Step", "draw", "mermaid", "read_toml"]
+__all__ = [
+    "Edge",
+    "Guard",
+    "RewardMachine",
+    "State",
+    "Step",
+    "draw",
+    "mermaid",
+    "read_toml",
+    "tables_in",
+]

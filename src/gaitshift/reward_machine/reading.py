@@ -84,13 +84,11 @@ class Table:
 
     def pair(self, key: str, *, default: tuple[float, float]) -> tuple[float, float]:
         """Return two numbers, the lower and the upper end of a range."""
-        ends = self._list(key, "two numbers, such as [0.4, 1.6]") if self.has(key) else [*default]
-        if len(ends) != 2 or not all(type(end) in (int, float) for end in ends):
-            raise _wrong(key, "two numbers, such as [0.4, 1.6]", ends)
-        try:
-            low, high = (float(end) for end in cast(list[float], ends))
-        except OverflowError:
-            raise _wrong(key, "two numbers of a usual size", ends) from None
+        wanted = "two numbers, such as [0.4, 1.6]"
+        ends: list[object] = self._list(key, wanted) if self.has(key) else [*default]
+        if len(ends) != 2:
+            raise _wrong(key, wanted, ends)
+        low, high = self._numbers(key, ends, wanted)
         return low, high
 
     def feet(self, key: str) -> Feet:
@@ -103,9 +101,35 @@ class Table:
                 raise GaitshiftError(f"{key!r} names {name} twice")
         return frozenset(cast(list[str], names))
 
+    def table(self, key: str) -> dict[str, object]:
+        """Return a table of tables, [key.NAME] in TOML, each still to be read."""
+        value = self.get(key)
+        if isinstance(value, dict) and value:
+            return cast(dict[str, object], value)
+        raise _wrong(key, f"tables with names, [{key}.NAME]", cast(object, value))
+
+    def points(self, key: str) -> tuple[tuple[float, float], ...]:
+        """Return a list of pairs of numbers."""
+        wanted = "pairs of numbers, such as [[0.4, 0.8], [1.2, 1.0]]"
+        pairs = self._list(key, wanted)
+        for pair in pairs:
+            if not isinstance(pair, list) or len(cast(list[object], pair)) != 2:
+                raise _wrong(key, wanted, pairs)
+        read = (self._numbers(key, cast(list[object], pair), wanted) for pair in pairs)
+        return tuple((first, second) for first, second in read)
+
     def tables(self, key: str) -> list[object]:
         """Return a list of tables, [[key]] in TOML, each still to be read."""
         return self._list(key, f"a list of tables, [[{key}]]")
+
+    @staticmethod
+    def _numbers(key: str, values: list[object], wanted: str) -> list[float]:
+        if not all(type(value) in (int, float) for value in values):
+            raise _wrong(key, wanted, values)
+        try:
+            return [float(value) for value in cast(list[float], values)]
+        except OverflowError:
+            raise _wrong(key, "numbers of a usual size", values) from None
 
     def _list(self, key: str, wanted: str) -> list[object]:
         value = self.get(key)

@@ -15,10 +15,11 @@ def read_toml(path: Path) -> RewardMachine:
     where TOML itself is broken and the table where the machine is.
     """
     with located(str(path)):
-        return RewardMachine.from_dict(_tables_in(path))
+        return RewardMachine.from_dict(tables_in(path))
 
 
-def _tables_in(path: Path) -> dict[str, object]:
+def tables_in(path: Path) -> dict[str, object]:
+    """The tables of a TOML file; `GaitshiftError`, without its path, where there are none."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:

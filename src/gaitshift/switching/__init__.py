@@ -1,10 +1,30 @@
 """The conditions by which a robot shifts its gait itself: numpy alone, fit to run on the robot."""
 
+from gaitshift.switching.attitude import AttitudeVariance as AttitudeVariance
+from gaitshift.switching.condition import Condition as Condition
+from gaitshift.switching.condition import ConditionState as ConditionState
 from gaitshift.switching.driver import Driver as Driver
+from gaitshift.switching.energy import CostOfTransport as CostOfTransport
+from gaitshift.switching.graph import Edge as Edge
+from gaitshift.switching.graph import GaitGraph as GaitGraph
 from gaitshift.switching.height_difference import HeightDifference as HeightDifference
-from gaitshift.switching.height_difference import HeightState as HeightState
 from gaitshift.switching.height_difference import height_in_frame as height_in_frame
+from gaitshift.switching.modulation import Modulation as Modulation
+from gaitshift.switching.named import CONDITIONS as CONDITIONS
+from gaitshift.switching.named import STATISTICS as STATISTICS
+from gaitshift.switching.named import load_condition as load_condition
+from gaitshift.switching.odometry import LegOdometry as LegOdometry
+from gaitshift.switching.oracle import Oracle as Oracle
+from gaitshift.switching.plane import PlaneResidual as PlaneResidual
+from gaitshift.switching.rule import Rule as Rule
+from gaitshift.switching.signals import Signals as Signals
+from gaitshift.switching.slip import Slip as Slip
+from gaitshift.switching.speed import SpeedCommand as SpeedCommand
+from gaitshift.switching.statistic import AnyStatistic as AnyStatistic
+from gaitshift.switching.statistic import Statistic as Statistic
 from gaitshift.switching.switcher import Autonomous as Autonomous
 from gaitshift.switching.switcher import Decision as Decision
 from gaitshift.switching.switcher import Scheduled as Scheduled
 from gaitshift.switching.switcher import Switcher as Switcher
+from gaitshift.switching.timing import ContactTiming as ContactTiming
+from gaitshift.switching.value_drop import ValueDrop as ValueDrop

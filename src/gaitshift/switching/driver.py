@@ -32,6 +32,8 @@ class Driver:
         self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
+        self.command: Command | None = None
+        """The command that robots acted on in the step seen last."""
         self.machine_state[:] = self._machines[self.gaits.index(start)].initial
 
     @property
@@ -49,6 +51,7 @@ class Driver:
 
         `command` is the one that the robots acted on.
         """
+        self.command = command
         self._touch_height = last_touch(motion, self._touch_height)
         stride = command.stride
         for index, ids in self._groups():

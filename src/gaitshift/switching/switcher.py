@@ -1,16 +1,18 @@
-"""Who changes the gaits: the foot-height condition, or a schedule."""
+"""Who changes the gaits: conditions on a graph, or a schedule."""
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from gaitshift.command import CONTROL_PERIOD
-from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
 from gaitshift.switching.driver import Driver
+from gaitshift.switching.graph import GaitGraph
 from gaitshift.switching.height_difference import HeightDifference
+from gaitshift.switching.signals import Signals
+from gaitshift.switching.statistic import AnyStatistic
 
 _ROUNDING = 1e-9
 """Times are multiples of 10 ms, give or take this [s]."""
@@ -21,7 +23,7 @@ class Decision:
     """What a switcher saw in one step, for logs: zero where it has no such notion."""
 
     k: Float[np.ndarray, " N"]
-    """The condition's counter, before a firing sets it back to 0."""
+    """The counter, before a firing sets it back to 0, of the edge that is nearest to firing."""
     threshold: Float[np.ndarray, " N"]
     """What k was held against."""
     foot_height: Float[np.ndarray, "N 4"]
@@ -38,39 +40,63 @@ class Switcher(Protocol):
 
 
 class Autonomous:
-    """The paper's higher controller: one gait for flat ground, one for rough, and a condition.
+    """The paper's higher controller, over any gait graph: the robots shift by its conditions.
 
-    While a robot is in the flat gait the rule k > β runs, in the rough gait the reverse rule.
+    Of the edges that leave a robot's gait each counts on its own; the first to fire is taken.
     """
 
-    def __init__(self, condition: HeightDifference, n: int, *, flat: str, rough: str) -> None:
-        if flat == rough:
-            raise GaitshiftError(f"the gaits for flat and for rough ground are both '{flat}'")
-        self.condition = condition
-        self.flat = flat
-        self.rough = rough
-        self._state = condition.start(n)
+    def __init__(self, graph: GaitGraph, n: int) -> None:
+        """All n robots stand in the graph's first gait, nothing counted yet."""
+        self.graph = graph
+        self._statistics: dict[str, AnyStatistic] = {**graph.statistics}
+        heights = [k for k, s in self._statistics.items() if isinstance(s, HeightDifference)]
+        self._heights = heights[0] if heights else "h, for logs"
+        self._statistics.setdefault(self._heights, HeightDifference())
+        self._memory: dict[str, Any] = {k: s.start(n) for k, s in self._statistics.items()}
+        self._k = np.zeros((n, len(graph.edges)))
+        self._time_in_gait = np.zeros(n)
 
     def step(self, time: float, motion: Motion, driver: Driver) -> Decision:
-        """Runs the condition; where it fires, the robot changes to the other gait."""
-        condition = self.condition
-        shifted = driver.gait == driver.gaits.index(self.rough)
-        before = self._state
-        self._state, fire = condition.step(
-            before,
-            contact=motion.contact,
-            foot_position_b=motion.foot_position_b,
-            gravity_b=motion.gravity_b,
-            shifted=shifted,
-        )
-        threshold = np.where(shifted, condition.beta_back, condition.beta)
-        driver.switch(np.flatnonzero(fire & ~shifted), self.rough, motion)
-        driver.switch(np.flatnonzero(fire & shifted), self.flat, motion)
-        return Decision(
-            k=self._state.counted,
-            threshold=threshold,
-            foot_height=self._state.height,
-        )
+        """Lets the edges count; where one fires, the robot changes to the gait it leads to."""
+        signals = Signals.from_motion(motion, time=time, command=driver.command)
+        values: dict[str, np.ndarray] = {}
+        for name, statistic in self._statistics.items():
+            self._memory[name], values[name] = statistic.step(self._memory[name], signals)
+        self._time_in_gait = self._time_in_gait + signals.period
+        decision, fire = self._count(signals, values, driver)
+        self._shift(fire, motion, driver)
+        return decision
+
+    def _count(
+        self, signals: Signals, values: dict[str, np.ndarray], driver: Driver
+    ) -> tuple[Decision, Bool[np.ndarray, "N E"]]:
+        """Moves the counters of the edges that leave each robot's gait: which of them fire."""
+        n = len(self._k)
+        k, threshold, nearest = np.zeros(n), np.zeros(n), np.full(n, -np.inf)
+        fire = np.zeros(self._k.shape, dtype=bool)
+        for index, edge in enumerate(self.graph.edges):
+            here = driver.gait == driver.gaits.index(edge.source)
+            factor = 1.0 if edge.modulation is None else edge.modulation.factor(signals)
+            counted = edge.rule.step(self._k[:, index], values[edge.statistic], factor)
+            self._k[here, index] = counted[here]
+            fire[:, index] = here & edge.rule.fires(counted, self._time_in_gait)
+            near = counted / (edge.rule.beta + 1.0)
+            closer = here & (near > nearest)
+            nearest[closer] = near[closer]
+            k[closer], threshold[closer] = counted[closer], edge.rule.beta
+        height = np.nan_to_num(self._memory[self._heights])  # of feet that never touched: 0
+        return Decision(k=k, threshold=threshold, foot_height=height), fire
+
+    def _shift(self, fire: Bool[np.ndarray, "N E"], motion: Motion, driver: Driver) -> None:
+        edges = self.graph.edges
+        free = np.ones(len(self._k), dtype=bool)
+        for index in sorted(range(len(edges)), key=lambda i: -edges[i].priority):
+            takes = free & fire[:, index]
+            driver.switch(np.flatnonzero(takes), edges[index].target, motion)
+            free &= ~takes
+        self._time_in_gait[~free] = 0.0
+        if self.graph.reset:
+            self._k[~free] = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,76 @@
+"""Statistics and conditions by their names, for files and command lines."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine.reading import Table, known_names
+from gaitshift.switching.attitude import AttitudeVariance
+from gaitshift.switching.condition import Condition
+from gaitshift.switching.energy import CostOfTransport
+from gaitshift.switching.height_difference import HeightDifference
+from gaitshift.switching.oracle import Oracle
+from gaitshift.switching.plane import PlaneResidual
+from gaitshift.switching.slip import Slip
+from gaitshift.switching.speed import SpeedCommand
+from gaitshift.switching.statistic import AnyStatistic
+from gaitshift.switching.timing import ContactTiming
+from gaitshift.switching.value_drop import ValueDrop
+
+STATISTICS: dict[str, type[Any]] = {
+    "height_difference": HeightDifference,
+    "plane_residual": PlaneResidual,
+    "attitude_variance": AttitudeVariance,
+    "contact_timing": ContactTiming,
+    "slip": Slip,
+    "cost_of_transport": CostOfTransport,
+    "value_drop": ValueDrop,
+    "speed": SpeedCommand,
+    "oracle": Oracle,
+}
+"""Kinds of statistic; a new one is a file and a line here."""
+
+CONDITIONS: dict[str, Condition] = {
+    "height_difference": Condition(),
+    "paper": Condition.paper(),
+    "oracle": Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0),
+}
+"""Conditions ready for use."""
+
+
+def load_condition(name: str, **changes: float | None) -> Condition:
+    """The condition of this name, with some of its numbers changed; None leaves one as it is.
+
+    Raises:
+        GaitshiftError: no such condition, or a number out of range.
+    """
+    if name not in CONDITIONS:
+        raise GaitshiftError(known_names("condition", name, tuple(CONDITIONS)))
+    given: dict[str, Any] = {k: v for k, v in changes.items() if v is not None}
+    return replace(CONDITIONS[name], **given)
+
+
+def statistic(data: object) -> AnyStatistic:
+    """The statistic that a table of a file describes: its `kind`, and settings of that kind."""
+    kind = Table(data, keys=_ALL_KEYS).text("kind")
+    if kind not in STATISTICS:
+        raise GaitshiftError(known_names("statistic", kind, tuple(STATISTICS)))
+    made = STATISTICS[kind]
+    table = Table(data, keys=("kind", *(field.name for field in fields(made))))
+    return made(**{f.name: _value(table, f.name, f.default) for f in fields(made)})
+
+
+_ALL_KEYS = tuple(
+    dict.fromkeys(("kind", *(f.name for made in STATISTICS.values() for f in fields(made))))
+)
+
+
+def _value(table: Table, key: str, default: Any) -> Any:
+    """What the table says of a key, of the type of its default."""
+    if not table.has(key):
+        return default
+    if isinstance(default, str):
+        return table.text(key)
+    if isinstance(default, int):
+        return table.whole(key)
+    return table.number(key)
