@@ -908,6 +908,24 @@ def test_strictness_is_how_far_the_bonus_depends_on_the_swing(strictness, monkey
     assert len([share for share in step if 0 < share < 1]) > 5
 
 
+def test_a_swing_factor_is_higher_swings_asked_for():
+    envs = [
+        GaitEnv(with_swing_height(height), FLAT, 4, config=EnvConfig(), threads=1)
+        for height in (0.2, 0.3)
+    ]
+    envs[0].swing_factor = 1.5
+    for env in envs:
+        env.reset(seed=0)
+    partly = 0
+    for action in arbitrary_actions(2, 100, 4, size=1.5):
+        (_, by_factor, *_), (_, by_machine, *_, info) = (env.step(action) for env in envs)
+        np.testing.assert_allclose(by_factor, by_machine, atol=1e-9)
+        partly += np.count_nonzero(
+            info["changed"] & (info["bonus"] < 0.5 * envs[0].config.reward.bonus)
+        )
+    assert partly > 5
+
+
 @pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
 def test_a_late_change_earns_less_of_the_bonus(strictness):
     """Against an env that does not ask: full until 2 steps late, nothing half a dwell after it."""

@@ -54,6 +54,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.strictness = 1.0
         """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
         depends on swing heights and punctuality, and factor on the price of chatter."""
+        self.swing_factor = 1.0
+        """Factor on the machine's swing heights now."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.penalty_scale = 1.0
@@ -93,7 +95,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         dwell = self.machine.dwell_for(self._command.stride)
         step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
         on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
-        chatter, swing_share = self._swings.see(self._state, step, motion)
+        chatter, swing_share = self._swings.see(self._state, step, motion, self.swing_factor)
         self._touch_height = last_touch(motion, self._touch_height)
         self._state = step.state
         self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)

@@ -27,7 +27,7 @@ class Swings:
         self._may_land[ids] = True
 
     def see(
-        self, left: Int[np.ndarray, " N"], step: Step, motion: Motion
+        self, left: Int[np.ndarray, " N"], step: Step, motion: Motion, factor: float = 1.0
     ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         """Number of touchdowns out of place, and share of the swing height that was reached.
 
@@ -39,6 +39,7 @@ class Swings:
             left: state in which the machine was.
             step: what its step did.
             motion: the motion after the step.
+            factor: on the machine's swing heights.
         """
         lands = motion.contact & ~self._touches
         in_place = lands & self._may_land & self._machine.expected(left)
@@ -47,4 +48,6 @@ class Swings:
         self._touches = motion.contact.copy()
         self._may_land = (self._may_land & ~in_place) | lifted
         self._height = np.where(lifted, motion.clearance, height)
-        return (lands & ~in_place).sum(axis=1), self._machine.swing_share(step.edge, height)
+        return (lands & ~in_place).sum(axis=1), self._machine.swing_share(
+            step.edge, height / factor
+        )
