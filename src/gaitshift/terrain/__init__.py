@@ -5,7 +5,7 @@ from gaitshift.terrain.pebbles import pebbles
 from gaitshift.terrain.perlin import perlin
 from gaitshift.terrain.shapes import bank, flat, slope, stairs, step
 from gaitshift.terrain.spec import KINDS, Kind, from_spec, spec_help
-from gaitshift.terrain.track import track
+from gaitshift.terrain.track import sections_of, track
 from gaitshift.terrain.unit_interval import UnitField, to_unit_interval
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "from_spec",
     "pebbles",
     "perlin",
+    "sections_of",
     "slope",
     "spec_help",
     "stairs",

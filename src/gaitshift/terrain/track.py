@@ -55,6 +55,24 @@ def track(
     )
 
 
+def sections_of(name: str, x0: float, length: float) -> tuple[Section, ...]:
+    """The pieces along x of a ground by its name alone, from `x0` on over `length` [m].
+
+    Raises:
+        GaitshiftError: it is not a name as `Terrain.name` has them.
+    """
+    sections: list[Section] = []
+    for text in name.split(","):
+        piece, _, metres = text.partition("@")
+        try:
+            end = x0 + (float(metres) if metres else length)
+        except ValueError:
+            raise GaitshiftError(f"ground '{text}': '{metres}' is no length in metres") from None
+        sections.append(Section(name=piece, x0=x0, x1=end))
+        x0 = end
+    return tuple(sections)
+
+
 def _check_alike(pieces: Sequence[Terrain]) -> None:
     """`GaitshiftError` unless there are pieces and all have the first one's width and cell."""
     if not pieces:
