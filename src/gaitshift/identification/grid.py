@@ -65,15 +65,15 @@ def counts_at(
     slots = len(alphas) + 1
     if rule.when == "above":  # v > α_a where a is below the number of α smaller than v
         passed = np.searchsorted(alphas, np.where(np.isnan(values), -np.inf, values), "left")
-        each = np.zeros((steps * robots, slots), dtype=np.int16)
-        row: Int[np.ndarray, " R"] = np.arange(steps * robots)
-        for column in range(values.shape[2]):
-            each[row, passed[..., column].ravel()] += 1
-        above = each[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
+        row = slots * np.arange(steps * robots)[:, None]
+        each = np.bincount(
+            (row + passed.reshape(steps * robots, -1)).ravel(), minlength=row.size * slots
+        )
+        above = each.reshape(steps * robots, slots)[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
         return above.reshape(steps, robots, len(alphas))
     largest = values.max(axis=2)  # NaN where any is unknown
     reached = np.searchsorted(alphas, np.where(np.isnan(largest), np.inf, largest), "right")
-    return (np.arange(len(alphas)) >= reached[..., None]).astype(np.int16)
+    return (np.arange(len(alphas)) >= reached[..., None]).astype(np.int64)
 
 
 def _steps_alive(alive: Bool[np.ndarray, "T N"]) -> Int[np.ndarray, " N"]:
