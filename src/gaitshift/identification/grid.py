@@ -65,7 +65,7 @@ def counts_at(
     slots = len(alphas) + 1
     if rule.when == "above":  # v > α_a where a is below the number of α smaller than v
         passed = np.searchsorted(alphas, np.where(np.isnan(values), -np.inf, values), "left")
-        row = slots * np.arange(steps * robots)[:, None]
+        row: np.ndarray = slots * np.arange(steps * robots)[:, None]
         each = np.bincount(
             (row + passed.reshape(steps * robots, -1)).ravel(), minlength=row.size * slots
         )
