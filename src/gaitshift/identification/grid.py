@@ -1,6 +1,7 @@
 """A rule replayed for a whole grid of α and β in one pass over what a statistic saw."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -65,9 +66,9 @@ def counts_at(
     slots = len(alphas) + 1
     if rule.when == "above":  # v > α_a where a is below the number of α smaller than v
         passed = np.searchsorted(alphas, np.where(np.isnan(values), -np.inf, values), "left")
-        row: np.ndarray = slots * np.arange(steps * robots)[:, None]
+        row: Any = slots * np.arange(steps * robots)[:, None]
         each = np.bincount(
-            (row + passed.reshape(steps * robots, -1)).ravel(), minlength=row.size * slots
+            (row + passed.reshape(steps * robots, -1)).ravel(), minlength=steps * robots * slots
         )
         above = each.reshape(steps * robots, slots)[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
         return above.reshape(steps, robots, len(alphas))
