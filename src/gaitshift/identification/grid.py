@@ -1,7 +1,7 @@
 """A rule replayed for a whole grid of α and β in one pass over what a statistic saw."""
 
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -62,19 +62,10 @@ def counts_at(
     values: Float[np.ndarray, "T N M"], rule: Rule, alphas: Float[np.ndarray, " A"]
 ) -> Int[np.ndarray, "T N A"]:
     """How many times ε k grows in each step, at each α."""
-    steps, robots, _ = values.shape
-    slots = len(alphas) + 1
-    if rule.when == "above":  # v > α_a where a is below the number of α smaller than v
-        passed = np.searchsorted(alphas, np.where(np.isnan(values), -np.inf, values), "left")
-        row: Any = slots * np.arange(steps * robots)[:, None]
-        each = np.bincount(
-            (row + passed.reshape(steps * robots, -1)).ravel(), minlength=steps * robots * slots
-        )
-        above = each.reshape(steps * robots, slots)[:, ::-1].cumsum(axis=1)[:, ::-1][:, 1:]
-        return above.reshape(steps, robots, len(alphas))
-    largest = values.max(axis=2)  # NaN where any is unknown
-    reached = np.searchsorted(alphas, np.where(np.isnan(largest), np.inf, largest), "right")
-    return (np.arange(len(alphas)) >= reached[..., None]).astype(np.int64)
+    steps, robots, width = values.shape
+    rows = values.reshape(steps * robots, width)
+    counts = [replace(rule, alpha=float(alpha)).count(rows) for alpha in alphas]
+    return np.stack(counts, axis=1).reshape(steps, robots, len(alphas))
 
 
 def _steps_alive(alive: Bool[np.ndarray, "T N"]) -> Int[np.ndarray, " N"]:
