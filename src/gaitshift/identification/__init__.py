@@ -12,3 +12,4 @@ from gaitshift.identification.scores import false_shifts as false_shifts
 from gaitshift.identification.statistics import auc as auc
 from gaitshift.identification.statistics import poisson as poisson
 from gaitshift.identification.statistics import wilson as wilson
+from gaitshift.identification.table import passages as passages
