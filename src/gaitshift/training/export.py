@@ -36,10 +36,16 @@ def describe(env: GaitEnv, training: dict[str, Any]) -> PolicyInfo:
     )
 
 
-def export(actor: MLPModel, info: PolicyInfo, path: Path) -> None:
-    """Writes the actor's deterministic part and `info` as one ONNX file, whole or not at all."""
+def export(
+    actor: MLPModel, info: PolicyInfo, path: Path, layers: torch.nn.Sequential | None = None
+) -> None:
+    """Writes the actor's deterministic part and `info` as one ONNX file, whole or not at all.
+
+    `layers` stand in for the actor's own, behind its normalisation of observations.
+    """
     normalizer = cast(EmpiricalNormalization, actor.obs_normalizer)
-    write(list(actor.mlp), info, path, normalizer if actor.obs_normalization else None)
+    modules = list(actor.mlp if layers is None else layers)
+    write(modules, info, path, normalizer if actor.obs_normalization else None)
 
 
 def write(

@@ -5,6 +5,7 @@ import platform
 import shutil
 import time
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -154,7 +155,23 @@ class Run:
             "steps": self._steps(),
             "versions": _versions(),
         }
-        export(self.learner.ppo.actor, describe(self.learner.env, training), self.folder / POLICY)
+        info = describe(self.learner.env, training)
+        export(self.learner.ppo.actor, info, self.folder / POLICY, self._averaged())
+
+    def _averaged(self) -> torch.nn.Sequential:
+        """The present actor's layers, their weights averaged with those of the last checkpoints."""
+        layers = deepcopy(self.learner.ppo.actor.mlp)
+        total = {name: weights.clone() for name, weights in layers.state_dict().items()}
+        count = 1
+        for path in sorted((self.folder / CHECKPOINTS).glob("*.pt")):
+            earlier = int(path.stem)
+            if earlier < self.iteration and self.recipe.is_averaged(earlier):
+                state = _read_checkpoint(path)["ppo"]["actor_state_dict"]
+                for name, weights in total.items():
+                    weights += state[f"mlp.{name}"]
+                count += 1
+        layers.load_state_dict({name: weights / count for name, weights in total.items()})
+        return layers
 
     def iterate(self) -> Row:
         """One iteration, on the ground of its stage; gives the line that `train` writes down."""
@@ -203,12 +220,7 @@ class Run:
         part.replace(path)
 
     def _load_checkpoint(self, path: Path) -> None:
-        try:
-            state: dict[str, Any] = torch.load(path, weights_only=True)
-        except Exception as error:  # torch has no common class for a damaged file
-            raise GaitshiftError(
-                f"{path} is damaged; remove it to go on from the one before"
-            ) from error
+        state = _read_checkpoint(path)
         self.iteration = state["iteration"]
         self._wall = state["wall_s"]
         self.learner.ppo.load(state["ppo"], None, True)
@@ -228,6 +240,15 @@ class Run:
         self.export()
         verdict = judge(self.folder / POLICY)
         append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
+
+
+def _read_checkpoint(path: Path) -> dict[str, Any]:
+    try:
+        return torch.load(path, weights_only=True)
+    except Exception as error:  # torch has no common class for a damaged file
+        raise GaitshiftError(
+            f"{path} is damaged; remove it to go on from the one before"
+        ) from error
 
 
 def _seed_at(seed: int, iteration: int) -> int:
