@@ -12,13 +12,17 @@ from scipy import stats
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification import (
+    Grid,
     Recording,
+    Tally,
     auc,
+    choose,
     counts_at,
     detections,
     false_shifts,
     first_firings,
     poisson,
+    replay,
     wilson,
 )
 from gaitshift.switching import Condition, HeightDifference, PlaneResidual, Rule
@@ -196,3 +200,72 @@ def test_signals_of_a_recording_are_its_rows():
     np.testing.assert_array_equal(rows[1].yaw, [2.0, 3.0])
     np.testing.assert_array_equal(rows[2].foot_position_b, rec.foot_position_b[2])
     assert rows[0].power is None
+
+
+# The choice ---------------------------------------------------------------------------------------
+
+GRID = Grid(alphas=np.array([0.03, 0.06]), betas=np.array([10.0, 12.0, 20.0, 40.0]))
+
+
+def tally(fired, metres, detected=4, came=4):
+    """A tally by hand: false shifts and summed delays [m] at each α (rows) and β."""
+    made = Tally(shape=GRID.shape)
+    made.fired[:], made.metres[:] = fired, metres
+    made.detected[:], made.came[:] = detected, came
+    made.km[:] = 2.0
+    made.robots = 8
+    return made
+
+
+def test_the_soonest_of_the_settings_that_keep_still_is_chosen_with_headroom():
+    ground = {"walk": tally([[1, 0, 0, 0], [0, 0, 0, 0]], [[2, 4, 8, 16], [6, 7, 9, 20]])}
+    chosen = choose({0.0: ground}, GRID)
+    # α 0.03: β 12 is free of false shifts, but 12 / 1.25 is not; β 20 is. α 0.06: β 10 has nothing
+    # below it to show headroom, β 12 has no β between 9.6 and itself but 10 is above that.
+    assert (chosen.alpha, chosen.beta, chosen.is_free) == (0.03, 20.0, True)
+    assert chosen.cost_m == pytest.approx(8 / 4)
+
+
+def test_a_miss_costs_more_than_any_delay():
+    missed = np.array([[4, 4, 4, 4], [4, 4, 3, 4]])
+    ground = {"walk": tally(0, [[8, 8, 9, 8], [8, 8, 1, 8]], detected=missed)}
+    chosen = choose({0.0: ground}, GRID)
+    assert (chosen.alpha, chosen.beta) == (0.03, 40.0)
+
+
+def test_of_several_leaks_one_that_keeps_still_is_taken_before_a_sooner_one():
+    loud, calm = tally(1, 0.4), tally(0, 40.0)
+    chosen = choose({0.0: {"walk": loud}, 0.5: {"walk": calm}}, GRID)
+    assert (chosen.leak, chosen.is_free, chosen.false_per_km) == (0.5, True, 0.0)
+
+
+def test_where_nothing_keeps_still_the_fewest_false_shifts_are_taken():
+    ground = {"walk": tally([[3, 3, 2, 2], [3, 1, 2, 2]], 4.0)}
+    chosen = choose({0.0: ground}, GRID)
+    assert (chosen.alpha, chosen.beta, chosen.is_free) == (0.06, 12.0, False)
+    assert chosen.false_per_km == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"), [({"came": 0}, "no rough ground"), ({"km": 0.0}, "no smooth ground")]
+)
+def test_recordings_of_one_kind_of_ground_are_refused(change, message):
+    ground = tally(0, 1.0)
+    for name, value in change.items():
+        getattr(ground, name)[:] = value
+    with pytest.raises(GaitshiftError, match=message):
+        choose({0.0: {"walk": ground}}, GRID)
+
+
+def test_tallies_of_parts_are_the_tally_of_the_whole():
+    rng, statistic, rule = np.random.default_rng(4), HeightDifference(), Rule(alpha=1.0, beta=1.0)
+    recordings = [recording(rng, 120, 3, rough_from=60) for _ in range(3)]
+    whole = replay(recordings, statistic, rule, GRID)["noise"]
+    parts = Tally(shape=GRID.shape)
+    for one in recordings:
+        parts.join(replay([one], statistic, rule, GRID)["noise"])
+    for name in ("came", "detected", "seconds", "metres", "fired", "km"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name))
+    assert (parts.robots, whole.robots) == (9, 9)
+    assert whole.fired.any()
+    np.testing.assert_allclose(whole.delay_m, whole.delay_s, atol=0.011)  # they walk 1 m/s

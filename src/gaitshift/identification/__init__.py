@@ -1,5 +1,7 @@
 """Which condition, and with which numbers: recordings replayed over whole grids of α and β."""
 
+from gaitshift.identification.choice import Choice as Choice
+from gaitshift.identification.choice import choose as choose
 from gaitshift.identification.grid import counters as counters
 from gaitshift.identification.grid import counts_at as counts_at
 from gaitshift.identification.grid import first_firings as first_firings
@@ -13,3 +15,6 @@ from gaitshift.identification.statistics import auc as auc
 from gaitshift.identification.statistics import poisson as poisson
 from gaitshift.identification.statistics import wilson as wilson
 from gaitshift.identification.table import passages as passages
+from gaitshift.identification.tally import Grid as Grid
+from gaitshift.identification.tally import Tally as Tally
+from gaitshift.identification.tally import replay as replay

@@ -1,0 +1,94 @@
+"""The α, β and leak that a criterion chooses, and what other recordings say of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.identification.tally import Grid, Tally
+
+HEADROOM = 1.25
+"""No false shift on the recordings of the choice even at a β smaller by this factor; ours: what is
+chosen at the very edge fails on the next recordings."""
+
+MISS_COSTS = 20.0
+"""A rough stretch that went by without a shift counts as a delay of this many metres; ours."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A point of the grid, and how it did on the recordings that chose it."""
+
+    alpha: float
+    """α, in the statistic's unit."""
+    beta: float
+    """β [counts]."""
+    leak: float
+    """What k loses in each step [counts]."""
+    cost_m: float
+    """Mean delay with misses counted [m]: what was made small."""
+    false_per_km: float
+    """False shifts a kilometre of smooth ground at this α and β."""
+    is_free: bool
+    """Whether no robot shifted on smooth ground, with headroom in β; else the fewest were taken."""
+
+
+def choose(tallies: Mapping[float, Mapping[str, Tally]], grid: Grid) -> Choice:
+    """The soonest detection of rough ground among the settings that never shift on smooth ground.
+
+    Where there is none, those with the fewest false shifts a kilometre are taken.
+
+    Args:
+        tallies: by leak, then by the name of the recordings.
+        grid: the α and β that they are about.
+
+    Raises:
+        GaitshiftError: no robot came to rough ground, or none walked on smooth ground.
+    """
+    choices = [_best(leak, _together(by_name), grid) for leak, by_name in tallies.items()]
+    return min(choices, key=lambda c: (not c.is_free, 0 if c.is_free else c.false_per_km, c.cost_m))
+
+
+def _best(leak: float, tally: Tally, grid: Grid) -> Choice:
+    if not tally.came.any():
+        raise GaitshiftError("no rough ground in the recordings: nothing to detect")
+    if not tally.km.any():
+        raise GaitshiftError("no smooth ground in the recordings: nothing to keep still on")
+    cost = _cost(tally)
+    free = _free(tally, grid)
+    allowed = free if free.any() else tally.fired == tally.fired.min()
+    a, b = np.unravel_index(np.where(allowed, cost, np.inf).argmin(), grid.shape)
+    return Choice(
+        alpha=float(grid.alphas[a]),
+        beta=float(grid.betas[b]),
+        leak=leak,
+        cost_m=float(cost[a, b]),
+        false_per_km=float(tally.false_per_km[a, b]),
+        is_free=bool(free.any()),
+    )
+
+
+def _together(by_name: Mapping[str, Tally]) -> Tally:
+    tallies = list(by_name.values())
+    if not tallies:
+        raise GaitshiftError("no recordings to choose by")
+    whole = Tally(shape=tallies[0].shape)
+    for tally in tallies:
+        whole.join(tally)
+    return whole
+
+
+def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
+    """Mean delay [m] over all that came to rough ground, a miss counting `MISS_COSTS`."""
+    missed = tally.came - tally.detected
+    total = tally.metres + MISS_COSTS * missed
+    return np.where(tally.came > 0, total / np.maximum(tally.came, 1), np.inf)
+
+
+def _free(tally: Tally, grid: Grid) -> np.ndarray:
+    """Where nobody fired on smooth ground, nor at the next β below β / `HEADROOM`."""
+    clean = tally.fired == 0
+    below = np.searchsorted(grid.betas, grid.betas / HEADROOM, "right") - 1
+    return clean & np.where(below >= 0, clean[:, np.maximum(below, 0)], False)
