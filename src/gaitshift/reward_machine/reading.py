@@ -129,7 +129,7 @@ class Table:
         try:
             return [float(value) for value in cast(list[float], values)]
         except OverflowError:
-            raise _wrong(key, "numbers of a usual size", values) from None
+            raise _wrong(key, "two numbers of a usual size", values) from None
 
     def _list(self, key: str, wanted: str) -> list[object]:
         value = self.get(key)
