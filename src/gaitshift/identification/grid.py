@@ -1,16 +1,10 @@
 """A rule replayed for a whole grid of α and β in one pass over what a statistic saw."""
 
-from collections.abc import Iterator
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.switching import Rule
-
-_CHUNK = 20_000_000
-"""Numbers of k kept at a time: 160 MB."""
 
 
 def first_firings(
@@ -33,47 +27,48 @@ def first_firings(
         if len(grid) == 0 or np.any(np.diff(grid) <= 0.0):
             raise GaitshiftError(f"the grid of {name} must have rising values")
     steps, robots, _ = values.shape
-    first = np.empty((robots, len(alphas), len(betas)), dtype=np.int64)
-    for part in _parts(robots, max(1, _CHUNK // (steps * len(alphas)))):
-        k = counters(values[:, part], rule, alphas)
-        highest = np.maximum.accumulate(k, axis=0)
-        rising = np.ascontiguousarray(np.moveaxis(highest, 0, 2))
-        for robot in range(rising.shape[0]):
-            for a in range(len(alphas)):
-                first[part.start + robot, a] = np.searchsorted(rising[robot, a], betas, "right")
-    first[first >= _steps_alive(alive)[:, None, None]] = steps
+    first = np.empty((robots, len(alphas), len(betas)), dtype=np.int32)
+    last = _steps_alive(alive)
+    for robot in range(robots):
+        k = counters(values[:, robot], rule, alphas)
+        rising = np.maximum.accumulate(k, axis=1) if rule.leak else k
+        for a in range(len(alphas)):
+            first[robot, a] = np.searchsorted(rising[a], betas, "right")
+        first[robot][first[robot] >= last[robot]] = steps
     return first
 
 
 def counters(
-    values: Float[np.ndarray, "T N M"], rule: Rule, alphas: Float[np.ndarray, " A"]
-) -> Float[np.ndarray, "T N A"]:
-    """Counter k after each step, at each α, never set back."""
-    counts = counts_at(values, rule, alphas)
-    k = np.empty(counts.shape)
-    last = np.zeros(counts.shape[1:])
-    for t, count in enumerate(counts):
-        last = np.maximum(last + (rule.epsilon * count - rule.leak), 0.0)
-        k[t] = last
+    values: Float[np.ndarray, "T M"], rule: Rule, alphas: Float[np.ndarray, " A"]
+) -> Float[np.ndarray, "A T"]:
+    """Counter k of one robot after each step, at each α, never set back."""
+    growth = rule.epsilon * counts_at(values, rule, alphas) - rule.leak
+    if not rule.leak:
+        return growth.cumsum(axis=1)
+    k, last = np.empty(growth.shape), np.zeros(len(alphas))
+    for t in range(growth.shape[1]):
+        last = np.maximum(last + growth[:, t], 0.0)
+        k[:, t] = last
     return k
 
 
 def counts_at(
-    values: Float[np.ndarray, "T N M"], rule: Rule, alphas: Float[np.ndarray, " A"]
-) -> Int[np.ndarray, "T N A"]:
-    """How many times ε k grows in each step, at each α."""
-    steps, robots, width = values.shape
-    rows = values.reshape(steps * robots, width)
-    counts = [replace(rule, alpha=float(alpha)).count(rows) for alpha in alphas]
-    return np.stack(counts, axis=1).reshape(steps, robots, len(alphas))
+    values: Float[np.ndarray, "T M"], rule: Rule, alphas: Float[np.ndarray, " A"]
+) -> Int[np.ndarray, "A T"]:
+    """How many times ε k grows in each step of one robot, at each α."""
+    steps = len(values)
+    if rule.when == "below":
+        largest = values.max(axis=1)  # NaN where any is unknown
+        return (largest < alphas[:, None]).astype(np.int64)
+    # A value is above as many of the rising α as are smaller than it.
+    passed = np.searchsorted(alphas, np.where(np.isnan(values), -np.inf, values), "left")
+    slot = passed * steps + np.arange(steps)[:, None]
+    shape = (len(alphas) + 1, steps)
+    each = np.bincount(slot.ravel(), minlength=shape[0] * steps).astype(np.int32).reshape(shape)
+    return each[::-1].cumsum(axis=0, dtype=np.int32)[::-1][1:]
 
 
 def _steps_alive(alive: Bool[np.ndarray, "T N"]) -> Int[np.ndarray, " N"]:
     """Steps before each robot fell."""
     fell = ~alive
     return np.where(fell.any(axis=0), fell.argmax(axis=0), len(alive))
-
-
-def _parts(total: int, size: int) -> Iterator[slice]:
-    for start in range(0, total, size):
-        yield slice(start, min(start + size, total))
