@@ -30,6 +30,7 @@ from gaitshift.switching import (
     load_condition,
 )
 from gaitshift.switching.plane import deviation
+from turning import rotation
 
 quick = settings(max_examples=60, deadline=None)
 PERIOD = 0.01
@@ -190,15 +191,6 @@ def test_tilting_and_lifting_the_ground_changes_no_deviation(xyz, slope_x, slope
 def test_three_touches_tell_nothing():
     known = np.array([[True, True, True, False]])
     assert np.isnan(deviation(FEET[None], known))
-
-
-def rotation(roll, pitch, yaw):
-    """Body axes in the world as columns: yaw, then pitch, then roll, each about the body's axis."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x
 
 
 def strolling(height, *, seconds=4.0, speed=1.0, turn=0.2, wobble=0.15):

@@ -18,6 +18,7 @@ from gaitshift.switching import (
     Signals,
     height_in_frame,
 )
+from turning import rotation
 
 PAPER = Condition.paper()
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -210,15 +211,6 @@ def test_alpha_can_change_between_steps_and_the_count_goes_on():
     state = ConditionState(statistic=z, k=seven, counted=seven, time_in_gait=seven)
     assert walk(replace(PAPER, alpha=0.25), z, contact, state=state)[0].item() == 7 + 4
     assert walk(replace(PAPER, alpha=0.55), z, contact, state=state)[0].item() == 7 + 1
-
-
-def rotation(roll, pitch, yaw):
-    """Body axes in the world as columns: yaw, then pitch, then roll, each about the body's axis."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos([roll, pitch, yaw]), np.sin([roll, pitch, yaw])
-    about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
-    about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
-    return about_z @ about_y @ about_x
 
 
 @quick

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
+from gaitshift import policy
 from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import DemoConfig, run_demo
 from gaitshift.identification import (
     Grid,
     Recording,
@@ -23,9 +25,10 @@ from gaitshift.identification import (
     first_firings,
     poisson,
     replay,
+    rough_ground,
     wilson,
 )
-from gaitshift.switching import Condition, HeightDifference, PlaneResidual, Rule
+from gaitshift.switching import Condition, HeightDifference, PlaneResidual, Rule, load_condition
 from gaitshift.terrain import from_spec, sections_of
 
 quick = settings(max_examples=40, deadline=None)
@@ -268,3 +271,43 @@ def test_tallies_of_parts_are_the_tally_of_the_whole():
     assert (parts.robots, whole.robots) == (9, 9)
     assert whole.fired.any()
     np.testing.assert_allclose(whole.delay_m, whole.delay_s, atol=0.011)  # they walk 1 m/s
+
+
+@pytest.fixture(scope="module")
+def demo():
+    """Two robots over 3 m of noise between level ground, and the condition they shifted by."""
+    config = DemoConfig(track="flat@3,perlin:0.12@5,slope:5@3", episodes=2, beta=60.0)
+    policies = {gait: policy.load(gait) for gait in config.used}
+    log, _ = run_demo(config, policies)
+    return log, load_condition(config.condition, beta=60.0)
+
+
+def test_noise_is_rough_and_level_ground_and_slopes_are_not(demo):
+    log, _ = demo
+    x = log.qpos[..., 0]
+    np.testing.assert_array_equal(rough_ground(log), (x >= 3.0) & (x < 8.0))
+    assert x.max() > 9.0, "a slope was walked on"
+
+
+def test_a_log_replayed_shifts_in_the_step_in_which_the_robots_did(demo):
+    log, condition = demo
+    rec = Recording.from_log(log, "demo", rough_ground(log))
+    at = (np.array([condition.alpha]), np.array([condition.beta]))
+    first = first_firings(rec.values(condition.statistic), rec.alive, condition.rough, *at)
+    shifted = log.gait != log.gait[0]
+    assert shifted.any(axis=0).all()
+    np.testing.assert_array_equal(first[:, 0, 0], shifted.argmax(axis=0))
+
+
+def test_signals_of_a_log_are_those_that_robots_had(demo):
+    log, _ = demo
+    rec = Recording.from_log(log, "demo", rough_ground(log))
+    np.testing.assert_allclose(np.linalg.norm(rec.gravity_b, axis=2), 1.0)
+    # Feet are as far from the base whatever frame they are seen in.
+    feet = log.foot_position_w - log.qpos[:, :, None, :3]
+    np.testing.assert_allclose(
+        np.linalg.norm(rec.foot_position_b, axis=3), np.linalg.norm(feet, axis=3), atol=1e-5
+    )
+    way = log.qpos[..., 0] - log.qpos[0, :, 0]
+    assert (rec.distance >= way - 1e-3).all(), "a way is no shorter than the straight line"
+    assert (rec.distance <= 1.1 * way + 0.2).all()

@@ -49,19 +49,7 @@ class Motion:
     @cached_property
     def rotation_wb(self) -> Float[np.ndarray, "N 3 3"]:
         """Rotation matrices from body to world."""
-        w, x, y, z = self.base_quaternion_w.T
-        xx, yy, zz = x * x, y * y, z * z
-        xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
-        rows = (
-            (1 - 2 * (yy + zz), 2 * (xy - wz), 2 * (xz + wy)),
-            (2 * (xy + wz), 1 - 2 * (xx + zz), 2 * (yz - wx)),
-            (2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy)),
-        )
-        rotation = np.empty((len(w), 3, 3))
-        for i, row in enumerate(rows):
-            for j, entry in enumerate(row):
-                rotation[:, i, j] = entry
-        return rotation
+        return rotation_of(self.base_quaternion_w)
 
     @cached_property
     def base_linear_velocity_b(self) -> Float[np.ndarray, "N 3"]:
@@ -100,3 +88,20 @@ class Motion:
         ground, so a robot can compute it from its joints and its attitude alone.
         """
         return self.base_position_w[:, 2] - self.foot_position_w[:, :, 2].min(axis=1)
+
+
+def rotation_of(quaternion: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, "*batch 3 3"]:
+    """Rotation matrices of unit quaternions (w, x, y, z)."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    xx, yy, zz = x * x, y * y, z * z
+    xy, xz, yz, wx, wy, wz = x * y, x * z, y * z, w * x, w * y, w * z
+    rows = (
+        (1 - 2 * (yy + zz), 2 * (xy - wz), 2 * (xz + wy)),
+        (2 * (xy + wz), 1 - 2 * (xx + zz), 2 * (yz - wx)),
+        (2 * (xz - wy), 2 * (yz + wx), 1 - 2 * (xx + yy)),
+    )
+    rotation = np.empty((*w.shape, 3, 3))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            rotation[..., i, j] = entry
+    return rotation

@@ -28,7 +28,7 @@ def first_firings(
             raise GaitshiftError(f"the grid of {name} must have rising values")
     steps, robots, _ = values.shape
     first = np.empty((robots, len(alphas), len(betas)), dtype=np.int32)
-    last = _steps_alive(alive)
+    last = steps_alive(alive)
     for robot in range(robots):
         k = counters(values[:, robot], rule, alphas)
         rising = np.maximum.accumulate(k, axis=1) if rule.leak else k
@@ -68,7 +68,7 @@ def counts_at(
     return each[::-1].cumsum(axis=0, dtype=np.int32)[::-1][1:]
 
 
-def _steps_alive(alive: Bool[np.ndarray, "T N"]) -> Int[np.ndarray, " N"]:
+def steps_alive(alive: Bool[np.ndarray, "T N"]) -> Int[np.ndarray, " N"]:
     """Steps before each robot fell."""
     fell = ~alive
     return np.where(fell.any(axis=0), fell.argmax(axis=0), len(alive))

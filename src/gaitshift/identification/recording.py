@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.log import Log
+from gaitshift.motion import rotation_of
 from gaitshift.switching import AnyStatistic, Signals
 
 _PER_STEP = (
@@ -94,7 +95,8 @@ class Recording:
     def from_log(cls, log: Log, name: str, rough: Bool[np.ndarray, "T N"]) -> "Recording":
         """A recording of one of our logs."""
         qpos, qvel = log.qpos.astype(np.float64), log.qvel.astype(np.float64)
-        rotation = _rotation_wb(qpos[..., 3:7])
+        quaternion = qpos[..., 3:7]  # single precision: not quite of length 1
+        rotation = rotation_of(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True))
         feet = log.foot_position_w.astype(np.float64) - qpos[:, :, None, :3]
         step = np.diff(qpos[..., :2], axis=0, prepend=qpos[:1, :, :2])
         return cls(
@@ -113,14 +115,3 @@ class Recording:
             speed_command=log.command[..., 0],
             stride=1.0 / log.command[..., 2],
         )
-
-
-def _rotation_wb(quaternion: Float[np.ndarray, "T N 4"]) -> Float[np.ndarray, "T N 3 3"]:
-    """Rotation matrices from body to world, of quaternions (w, x, y, z) of whatever length."""
-    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

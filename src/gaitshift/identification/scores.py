@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from gaitshift.identification.grid import steps_alive
 from gaitshift.identification.recording import Recording
 
 
@@ -57,7 +58,7 @@ def detections(recording: Recording, first: Int[np.ndarray, "N A B"]) -> Detecti
 def false_shifts(recording: Recording, first: Int[np.ndarray, "N A B"]) -> FalseShifts:
     """The firings before any rough ground, and the way walked until then."""
     entry, _ = _stretch(recording)
-    limit = np.minimum(entry, _steps_alive(recording))[:, None, None]
+    limit = np.minimum(entry, steps_alive(recording.alive))[:, None, None]
     fired = first < limit
     until = np.maximum(np.where(fired, first, limit) - 1, 0)
     way = recording.distance[until, np.arange(recording.robots)[:, None, None]]
@@ -75,8 +76,3 @@ def _stretch(recording: Recording) -> tuple[Int[np.ndarray, " N"], Int[np.ndarra
     after = ~rough & (np.arange(steps)[:, None] >= entry)
     end = np.where(after.any(axis=0), after.argmax(axis=0), steps)
     return entry, end
-
-
-def _steps_alive(recording: Recording) -> Int[np.ndarray, " N"]:
-    fell = ~recording.alive
-    return np.where(fell.any(axis=0), fell.argmax(axis=0), len(recording.time))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.legs import LEG_PAIRS
@@ -44,17 +44,8 @@ class HeightDifference:
     ) -> tuple[Float[np.ndarray, "N 4"], Float[np.ndarray, "N 6"]]:
         """Heights h after this step [m], and how its pairs differ."""
         now = height_in_frame(signals.foot_position_b, signals.gravity_b, self.frame)
-        height = last_touched(state, now, signals.contact)
+        height = np.where(signals.contact, now, state)
         return height, np.abs(height.take(_FIRST, axis=1) - height.take(_SECOND, axis=1))
-
-
-def last_touched(
-    before: Float[np.ndarray, "N 4"],
-    now: Float[np.ndarray, "N 4"],
-    contact: Bool[np.ndarray, "N 4"],
-) -> Float[np.ndarray, "N 4"]:
-    """Height h_i: what it is now for feet in contact, what it was for the others."""
-    return np.where(contact, now, before)
 
 
 def height_in_frame(

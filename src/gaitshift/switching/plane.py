@@ -21,7 +21,7 @@ class PlaneState:
     """Where the base is."""
     touch: Float[np.ndarray, "N 4 K 3"]
     """Where each foot touched, the last first, in the odometry's frame [m]; NaN before that."""
-    steps_up: Float[np.ndarray, "N 4"]
+    time_up: Float[np.ndarray, "N 4"]
     """For how long each foot has not touched [s]."""
 
 
@@ -51,7 +51,7 @@ class PlaneResidual:
         return PlaneState(
             odometry=LegOdometry().start(n),
             touch=np.full((n, 4, self.touches, 3), np.nan),
-            steps_up=np.full((n, 4), np.inf),
+            time_up=np.full((n, 4), np.inf),
         )
 
     def step(
@@ -60,11 +60,11 @@ class PlaneResidual:
         """Touches after this step, and how far from a plane they lie."""
         odometry, foot = LegOdometry().step(state.odometry, signals)
         contact = signals.contact
-        new = contact & (state.steps_up >= self.least_swing)
+        new = contact & (state.time_up >= self.least_swing)
         touch = np.where(new[..., None, None], np.roll(state.touch, 1, axis=2), state.touch)
         touch[:, :, 0] = np.where(contact[..., None], foot, touch[:, :, 0])
-        steps_up = np.where(contact, 0.0, state.steps_up + signals.period)
-        after = PlaneState(odometry=odometry, touch=touch, steps_up=steps_up)
+        time_up = np.where(contact, 0.0, state.time_up + signals.period)
+        after = PlaneState(odometry=odometry, touch=touch, time_up=time_up)
         points = touch.reshape(len(touch), -1, 3)
         return after, deviation(points, ~np.isnan(points[..., 0]))[:, None]
 
