@@ -226,3 +226,11 @@ def test_grounds_of_an_evaluation_reach_as_far_as_robots_can_walk() -> None:
     assert len({g.height.tobytes() for g in grounds}) == 8
     slope = from_spec("slope:15", seed=0, length=10.0, width=4.0)
     assert slope.height.max() == pytest.approx(10 * np.tan(np.radians(15)), rel=1e-6)
+
+
+def test_a_graph_is_asked_for_without_numbers_of_a_condition():
+    assert DemoConfig(graph="speed").used == ("walk", "trot", "bound")
+    with pytest.raises(
+        GaitshiftError, match="a graph has its own numbers: change beta in its file"
+    ):
+        DemoConfig(graph="speed", beta=3.0)

@@ -32,6 +32,10 @@ START = 1.5
 """Where robots start along the track [m]."""
 
 
+_NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
+"""Numbers of a condition that a demonstration may change."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class DemoConfig:
     """What the demonstration shows."""
@@ -43,15 +47,15 @@ class DemoConfig:
     rough_gait: str = "bound"
     """The gait on rough ground."""
     condition: str = "height_difference"
-    """When to shift, by name: the foot heights, `paper` for its own setting, or a rival."""
+    """When to shift, by name: `height_difference`, or `paper` for its own setting."""
     alpha: float | None = None
-    """α: above it counts as rough [m, for the foot heights]; the condition's own by default."""
+    """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
     beta: float | None = None
     """β: shift to the rough gait when k exceeds it [counts]."""
     leak: float | None = None
     """What k loses in each step [counts]."""
     alpha_back: float | None = None
-    """α': all below it counts as flat [as α]."""
+    """α': all below it counts as flat [m]."""
     beta_back: float | None = None
     """β': shift back when k exceeds it [counts]."""
     hold: float | None = None
@@ -77,6 +81,11 @@ class DemoConfig:
             raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
         if not 0.2 <= self.every <= 60:
             raise GaitshiftError(f"a gait every {self.every} s: 0.2 to 60 s would be right")
+        given = [name for name in _NUMBERS if getattr(self, name) is not None]
+        if self.graph and given:
+            raise GaitshiftError(
+                f"a graph has its own numbers: change {given[0]} in its file, or leave --graph out"
+            )
         if len(self.gaits) == 1:
             raise GaitshiftError("one gait alone has nothing to shift to; give two or more")
 
@@ -103,8 +112,7 @@ class DemoConfig:
         """The gait graph that the robots shift by; `GaitshiftError` where it cannot be had."""
         if self.graph:
             return GaitGraph.load(self.graph)
-        numbers = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
-        condition = load_condition(self.condition, **{k: getattr(self, k) for k in numbers})
+        condition = load_condition(self.condition, **{k: getattr(self, k) for k in _NUMBERS})
         return GaitGraph.of(condition, flat=self.flat_gait, rough=self.rough_gait)
 
 

@@ -33,7 +33,6 @@ STATISTICS: dict[str, type[Any]] = {
 CONDITIONS: dict[str, Condition] = {
     "height_difference": Condition(),
     "paper": Condition.paper(),
-    "oracle": Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0),
 }
 """Conditions ready for use."""
 
