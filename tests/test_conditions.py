@@ -26,6 +26,7 @@ from gaitshift.switching import (
     Rule,
     Signals,
     Slip,
+    TouchdownSurprise,
     ValueDrop,
     load_condition,
 )
@@ -252,22 +253,56 @@ def test_a_flight_is_a_parabola():
     np.testing.assert_allclose(state.base[0] - lifted, [0.5 * flight * PERIOD, 0, 0], atol=0.01)
 
 
-@pytest.mark.parametrize("touches", [1, 2, 4])
-def test_a_slope_is_not_roughness_and_waves_are(touches):
-    statistic = PlaneResidual(touches=touches)
+def course(statistic, height, **walk):
+    """What a statistic of one number says in each step of a stroll over height(x, y)."""
+    state, seen = statistic.start(1), []
+    for _, signals in strolling(height, **walk):
+        state, value = statistic.step(state, signals)
+        seen.append(value[0, 0])
+    return np.array(seen)
+
+
+@pytest.mark.parametrize(
+    "statistic",
+    [
+        *(PlaneResidual(touches=touches) for touches in (1, 2, 4)),
+        TouchdownSurprise(),
+        TouchdownSurprise(touches=2, memory=12),
+    ],
+    ids=str,
+)
+def test_a_slope_is_not_roughness_and_waves_are(statistic):
     grounds = {
         "slope": lambda x, y: 0.25 * x - 0.1 * y,
         "waves": lambda x, y: 0.05 * math.sin(5 * x) * math.cos(7 * y),
     }
-    worst = {}
-    for name, height in grounds.items():
-        state, seen = statistic.start(1), []
-        for _, signals in strolling(height):
-            state, value = statistic.step(state, signals)
-            seen.append(value[0, 0])
-        worst[name] = np.nanmax(seen[100:])
+    worst = {name: np.nanmax(course(statistic, z)[100:]) for name, z in grounds.items()}
     assert worst["slope"] < 0.012, "what odometry is off by"
     assert worst["waves"] > 0.02, "a sine times a cosine of 5 cm has a deviation of 2.5 cm"
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_a_step_surprises_the_feet_that_lead_by_its_height_and_then_no_more(speed):
+    """Onwards it is the front feet that come to it first, backwards the hind ones."""
+    edge = 2.0 * speed
+    walk = {"speed": speed, "turn": 0.0, "wobble": 0.0, "seconds": 5.0}
+    for rise in (0.05, -0.08):
+        seen = course(
+            TouchdownSurprise(memory=1),
+            lambda x, y, rise=rise: rise * ((x - edge) * speed > 0),
+            **walk,
+        )
+        first = np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]
+        assert seen[first] == pytest.approx(abs(rise), abs=0.002), "the first foot on it"
+        assert np.isfinite(seen[first - 1]), "level ground before, and it was seen"
+        assert seen[-1] < 0.002, "level ground behind"
+
+
+def test_surprises_are_averaged_by_their_squares():
+    """Of four touchdowns one is met 6 cm too high: √(0.06² / 4) = 3 cm, just then."""
+    walk = {"turn": 0.0, "wobble": 0.0}
+    seen = course(TouchdownSurprise(memory=4), lambda x, y: 0.06 * (x > 2.0), **walk)
+    assert seen[np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]] == pytest.approx(0.03, abs=0.001)
 
 
 def test_a_foot_that_bounces_has_touched_once():

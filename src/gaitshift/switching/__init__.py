@@ -22,6 +22,7 @@ from gaitshift.switching.slip import Slip as Slip
 from gaitshift.switching.speed import SpeedCommand as SpeedCommand
 from gaitshift.switching.statistic import AnyStatistic as AnyStatistic
 from gaitshift.switching.statistic import Statistic as Statistic
+from gaitshift.switching.surprise import TouchdownSurprise as TouchdownSurprise
 from gaitshift.switching.switcher import Autonomous as Autonomous
 from gaitshift.switching.switcher import Decision as Decision
 from gaitshift.switching.switcher import Scheduled as Scheduled

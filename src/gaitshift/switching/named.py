@@ -14,12 +14,14 @@ from gaitshift.switching.plane import PlaneResidual
 from gaitshift.switching.slip import Slip
 from gaitshift.switching.speed import SpeedCommand
 from gaitshift.switching.statistic import AnyStatistic
+from gaitshift.switching.surprise import TouchdownSurprise
 from gaitshift.switching.timing import ContactTiming
 from gaitshift.switching.value_drop import ValueDrop
 
 STATISTICS: dict[str, type[Any]] = {
     "height_difference": HeightDifference,
     "plane_residual": PlaneResidual,
+    "touchdown_surprise": TouchdownSurprise,
     "attitude_variance": AttitudeVariance,
     "contact_timing": ContactTiming,
     "slip": Slip,

@@ -1,28 +1,19 @@
 """How far the last touches of the feet lie from one plane: slopes are not roughness."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.errors import GaitshiftError
-from gaitshift.switching.odometry import LegOdometry, OdometryState
 from gaitshift.switching.signals import Signals
+from gaitshift.switching.touches import Touches, TouchState, fit_plane
 
 LEAST = 4
 """Touches below which there is nothing to tell: a plane goes through any three."""
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PlaneState:
-    """What `PlaneResidual` remembers."""
-
-    odometry: OdometryState
-    """Where the base is."""
-    touch: Float[np.ndarray, "N 4 K 3"]
-    """Where each foot touched, the last first, in the odometry's frame [m]; NaN before that."""
-    time_up: Float[np.ndarray, "N 4"]
-    """For how long each foot has not touched [s]."""
+_RIDGE = 1e-9
+"""[m²], where feet stand in one line."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,29 +34,22 @@ class PlaneResidual:
     needs = ()
 
     def __post_init__(self) -> None:
-        if not 1 <= self.touches <= 100:
-            raise GaitshiftError(f"touches = {self.touches}: 1 to 100 a foot would be right")
+        _ = self._memory
 
-    def start(self, n: int) -> PlaneState:
+    @cached_property
+    def _memory(self) -> Touches:
+        return Touches(kept=self.touches, least_swing=self.least_swing)
+
+    def start(self, n: int) -> TouchState:
         """State of n robots of which no foot has touched."""
-        return PlaneState(
-            odometry=LegOdometry().start(n),
-            touch=np.full((n, 4, self.touches, 3), np.nan),
-            time_up=np.full((n, 4), np.inf),
-        )
+        return self._memory.start(n)
 
     def step(
-        self, state: PlaneState, signals: Signals
-    ) -> tuple[PlaneState, Float[np.ndarray, "N 1"]]:
+        self, state: TouchState, signals: Signals
+    ) -> tuple[TouchState, Float[np.ndarray, "N 1"]]:
         """Touches after this step, and how far from a plane they lie."""
-        odometry, foot = LegOdometry().step(state.odometry, signals)
-        contact = signals.contact
-        new = contact & (state.time_up >= self.least_swing)
-        touch = np.where(new[..., None, None], np.roll(state.touch, 1, axis=2), state.touch)
-        touch[:, :, 0] = np.where(contact[..., None], foot, touch[:, :, 0])
-        time_up = np.where(contact, 0.0, state.time_up + signals.period)
-        after = PlaneState(odometry=odometry, touch=touch, time_up=time_up)
-        points = touch.reshape(len(touch), -1, 3)
+        after, _, _ = self._memory.step(state, signals)
+        points = after.points
         return after, deviation(points, ~np.isnan(points[..., 0]))[:, None]
 
 
@@ -77,22 +61,7 @@ def deviation(
     NaN below four points; points that lie in one line are held against the line.
     """
     count = known.sum(axis=1)
-    x, y, z = (_centred(points[..., axis], known, count) for axis in range(3))
-    xx, xy, yy = (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
-    xz, yz = (x * z).sum(axis=1), (y * z).sum(axis=1)
-    ridge = 1e-9  # [m²], where feet stand in one line
-    determinant = (xx + ridge) * (yy + ridge) - xy * xy
-    slope_x = (xz * (yy + ridge) - yz * xy) / determinant
-    slope_y = (yz * (xx + ridge) - xz * xy) / determinant
-    residual = np.where(known, z - slope_x[:, None] * x - slope_y[:, None] * y, 0.0)
+    above = fit_plane(points, known, _RIDGE).above(points)
+    residual = np.where(known, above, 0.0)
     variance = (residual * residual).sum(axis=1) / np.maximum(count - 3, 1)
     return np.where(count < LEAST, np.nan, np.sqrt(variance))
-
-
-def _centred(
-    values: Float[np.ndarray, "N P"], known: Bool[np.ndarray, "N P"], count: np.ndarray
-) -> Float[np.ndarray, "N P"]:
-    """Less their mean over the known; 0 where not known."""
-    kept = np.where(known, values, 0.0)
-    mean = kept.sum(axis=1) / np.maximum(count, 1)
-    return np.where(known, kept - mean[:, None], 0.0)
