@@ -12,6 +12,7 @@ from gaitshift.cli.demo import Demo
 from gaitshift.cli.evaluate import Evaluate
 from gaitshift.cli.gaits import Gaits
 from gaitshift.cli.output import say
+from gaitshift.cli.record import Record
 from gaitshift.cli.reproduce import Reproduce
 from gaitshift.cli.train import Train
 from gaitshift.errors import GaitshiftError
@@ -21,6 +22,7 @@ Command = (
     | Annotated[Gaits, tyro.conf.subcommand("gaits")]
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
