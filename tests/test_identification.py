@@ -206,14 +206,19 @@ def test_signals_of_a_recording_are_its_rows():
 
 # The choice ---------------------------------------------------------------------------------------
 
-GRID = Grid(alphas=np.array([0.03, 0.06]), betas=np.array([10.0, 12.0, 20.0, 40.0]))
+GRID = Grid(alphas=np.array([0.01, 0.03, 0.06]), betas=np.array([10.0, 12.0, 20.0, 40.0]))
 
 
 def tally(fired, metres, detected=4, came=4):
-    """A tally by hand: false shifts and summed delays [m] at each α (rows) and β."""
+    """A tally by hand: false shifts and summed delays [m] at α 0.03 and 0.06 (rows) and each β.
+
+    α 0.01 is there for headroom: as quiet as 0.03, and never worth choosing.
+    """
     made = Tally(shape=GRID.shape)
-    made.fired[:], made.metres[:] = fired, metres
-    made.detected[:], made.came[:] = detected, came
+    made.fired[1:], made.metres[1:] = fired, metres
+    made.detected[1:], made.came[1:] = detected, came
+    made.fired[0], made.metres[0] = made.fired[1], 4000.0
+    made.detected[0], made.came[0] = made.detected[1], made.came[1]
     made.km[:] = 2.0
     made.robots = 8
     return made
@@ -226,6 +231,15 @@ def test_the_soonest_of_the_settings_that_keep_still_is_chosen_with_headroom():
     # below it to show headroom, β 12 has no β between 9.6 and itself but 10 is above that.
     assert (chosen.alpha, chosen.beta, chosen.is_free) == (0.03, 20.0, True)
     assert chosen.cost_m == pytest.approx(8 / 4)
+
+
+def test_a_setting_that_a_little_smaller_alpha_would_spoil_is_passed_over():
+    """α 0.03 is quiet, but 0.0295 is not, and lies within a twentieth of it."""
+    grid = Grid(alphas=np.array([0.01, 0.0295, 0.03, 0.032]), betas=np.array([0.0, 1.0]))
+    made = Tally(shape=grid.shape)
+    made.came[:], made.detected[:], made.km[:] = 4, 4, 2.0
+    made.fired[:2], made.metres[:] = 1, np.arange(4.0)[:, None]
+    assert choose({0.0: {"walk": made}}, grid).alpha == 0.032
 
 
 def test_a_miss_costs_more_than_any_delay():

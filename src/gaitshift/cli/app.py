@@ -11,6 +11,7 @@ from gaitshift.cli.bench import Bench
 from gaitshift.cli.demo import Demo
 from gaitshift.cli.evaluate import Evaluate
 from gaitshift.cli.gaits import Gaits
+from gaitshift.cli.identify import Identify
 from gaitshift.cli.output import say
 from gaitshift.cli.record import Record
 from gaitshift.cli.reproduce import Reproduce
@@ -23,6 +24,7 @@ Command = (
     | Annotated[Train, tyro.conf.subcommand("train")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Record, tyro.conf.subcommand("record")]
+    | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift.command import CONTROL_PERIOD, MOST_SPEED
+from gaitshift.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.gait_analysis import measure, robot_mass
@@ -41,6 +41,9 @@ class EvaluationConfig:
     """Commanded forward speed [m/s]; the gait's own by default."""
     stride_frequency: float | None = None
     """Commanded stride frequency [Hz]; the gait's own by default."""
+    open_loop: bool = False
+    """Ask the policy for the speed as it is; by default a slow loop trims what is asked for, so
+    that the mean speed is the commanded one."""
     push: float = 0.0
     """Largest push on the base, 0.2 s long, every 2 s [N]."""
     seed: int = 0
@@ -85,6 +88,7 @@ def run_policy(
         speed=config.speed,
         stride_frequency=config.stride_frequency,
         push=PushConfig(force=config.push),
+        speed_loop=None if config.open_loop else SpeedLoop(),
     )
     driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
     speed = policy.info.forward_speed if config.speed is None else config.speed

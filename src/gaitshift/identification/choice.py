@@ -13,6 +13,9 @@ HEADROOM = 1.25
 """No false shift on the recordings of the choice even at a β smaller by this factor; ours: what is
 chosen at the very edge fails on the next recordings."""
 
+ALPHA_HEADROOM = 1.05
+"""… and at an α smaller by this one, which is all the headroom there is where β is 0; ours."""
+
 MISS_COSTS = 20.0
 """A rough stretch that went by without a shift counts as a delay of this many metres; ours."""
 
@@ -88,7 +91,9 @@ def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
 
 
 def _free(tally: Tally, grid: Grid) -> np.ndarray:
-    """Where nobody fired on smooth ground, nor at the next β below β / `HEADROOM`."""
+    """Where nobody fired on smooth ground, nor at an α and β that much smaller."""
     clean = tally.fired == 0
-    below = np.searchsorted(grid.betas, grid.betas / HEADROOM, "right") - 1
-    return clean & np.where(below >= 0, clean[:, np.maximum(below, 0)], False)
+    alpha = np.searchsorted(grid.alphas, grid.alphas / ALPHA_HEADROOM, "right") - 1
+    beta = np.searchsorted(grid.betas, grid.betas / HEADROOM, "right") - 1
+    known = (alpha >= 0)[:, None] & (beta >= 0)
+    return clean & known & clean[np.maximum(alpha, 0)][:, np.maximum(beta, 0)]

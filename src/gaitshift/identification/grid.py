@@ -45,11 +45,10 @@ def counters(
     growth = rule.epsilon * counts_at(values, rule, alphas) - rule.leak
     if not rule.leak:
         return growth.cumsum(axis=1)
-    k, last = np.empty(growth.shape), np.zeros(len(alphas))
-    for t in range(growth.shape[1]):
-        last = np.maximum(last + growth[:, t], 0.0)
-        k[:, t] = last
-    return k
+    k, last = np.empty(growth.shape[::-1]), np.zeros(len(alphas))
+    for t, grown in enumerate(np.ascontiguousarray(growth.T)):
+        last = np.maximum(last + grown, 0.0, out=k[t])
+    return k.T
 
 
 def counts_at(

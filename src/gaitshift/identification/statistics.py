@@ -45,3 +45,13 @@ def auc(
     ranks = stats.rankdata(np.concatenate([rough, smooth]), axis=0)
     p, q = len(rough), len(smooth)
     return (ranks[:p].sum(axis=0) - p * (p + 1) / 2) / (p * q)
+
+
+def auc_interval(area: float, positives: int, negatives: int) -> tuple[float, float]:
+    """Interval of an area under the ROC curve: Wilson's, as if of the smaller number of trials.
+
+    On the safe side, and not without width where the area is 1.
+    """
+    trials = np.array([float(min(positives, negatives))])
+    low, high = wilson(area * trials, trials)
+    return float(low[0]), float(high[0])

@@ -1,0 +1,133 @@
+"""`gaitshift identify`: which condition, and with which numbers, from logs."""
+
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from gaitshift.cli.output import check_folder, emit_json, emit_table, say
+from gaitshift.errors import GaitshiftError
+
+if TYPE_CHECKING:
+    from gaitshift.identification.finding import Judged, Recordings
+
+REPORT, CONDITIONS, COURSES, ROC = "README.md", "conditions.csv", "courses.csv", "roc.png"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identify:
+    """Find α and β of a shift condition from logs, and judge them on others.
+
+    Logs are npz files of `gaitshift record`, `demo` and `evaluate`, or tables (CSV, Parquet) of any
+    robot with the columns time, rough, contact_LF, foot_LF_x and so on. Every condition is replayed
+    over a grid of α, β and leaks; the soonest detection that never shifts on smooth ground is
+    chosen. Writes README.md, conditions.csv, courses.csv, a map a condition, and ROC curves.
+    """
+
+    logs: Annotated[tuple[Path, ...], tyro.conf.Positional]
+    """Logs that choose the numbers."""
+    held_out: tuple[Path, ...] = ()
+    """Logs that judge them, of other seeds; without them the same ones do, and the report says
+    so."""
+    condition: tuple[str, ...] = ("touchdown_surprise",)
+    """Conditions to compare, by name; `all` for every one that the logs feed."""
+    way: Literal["rough", "flat"] = "rough"
+    """What is to be noticed: rough ground ahead, or, for the way back, that it has ended."""
+    out: Path
+    """Folder of the report."""
+    overwrite: bool = False
+    """Replace an earlier report in the folder."""
+    json: bool = False
+    """One JSON object on stdout."""
+
+    def run(self) -> None:
+        """Tunes, judges, and writes the report."""
+        try:
+            from gaitshift.identification import report as reports
+            from gaitshift.identification.candidates import candidates
+            from gaitshift.identification.finding import judge, tune
+            from gaitshift.identification.sources import check_sources
+        except ImportError as error:
+            raise GaitshiftError(
+                f"identify needs the package '{error.name}'; install gaitshift[identify]"
+            ) from error
+        if not self.logs:
+            raise GaitshiftError("which logs? make some with: gaitshift record trot --out logs")
+        names = () if "all" in self.condition else self.condition
+        wanted = candidates(names)
+        check_sources((*self.logs, *self.held_out))
+        check_folder(self.out, overwrite=self.overwrite, ours=(REPORT, CONDITIONS, COURSES, ROC))
+        tuned = tune(wanted, _reader(self.logs), way=self.way, report=_tell("choosing"))
+        missing = {c.name for c in wanted} - {t.candidate.name for t in tuned}
+        if names and missing:
+            raise GaitshiftError(f"the logs lack the signals of '{min(missing)}'")
+        judges = self.held_out or self.logs
+        judged = judge(tuned, _reader(judges), report=_tell("judging"))
+        self.out.mkdir(parents=True, exist_ok=True)
+        rows = reports.write_report(
+            judged,
+            self.out,
+            command=shlex.join(["gaitshift", *sys.argv[1:]]),
+            held_out=bool(self.held_out),
+            pictures=_draw(judged, self.out),
+        )
+        if self.json:
+            emit_json({"out": str(self.out), "conditions": rows})
+        else:
+            emit_table(f"conditions, by {len(judges)} logs; report in {self.out}", _table(rows))
+
+
+def _reader(paths: Sequence[Path]) -> "Recordings":
+    from gaitshift.identification.sources import recordings
+
+    return lambda: recordings(paths)
+
+
+def _tell(what: str) -> Callable[[str], None]:
+    def tell(name: str) -> None:
+        say(f"{what}: {name}")
+
+    return tell
+
+
+def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
+    """Draws the pictures into `out`: a line on each, by its file."""
+    from gaitshift.plots.identification import condition_map, roc_figure
+
+    pictures: dict[str, str] = {}
+    for one in judged:
+        name = one.tuned.candidate.name
+        condition_map(one.tuned, out / f"{name}.png")
+        pictures[f"{name}.png"] = f"How soon {name} notices, over α and β"
+    met = [c.course for c in judged[0].courses if judged[0].area(c.course) is not None]
+    if met:
+        hardest = min(met, key=lambda course: _area(judged[0], course))
+        roc_figure(judged, hardest, out / ROC)
+        pictures[ROC] = f"ROC curves on {hardest}"
+    return pictures
+
+
+def _area(one: "Judged", course: str) -> float:
+    area = one.area(course)
+    return 1.0 if area is None else area[0]
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
+    head = ("condition", "α", "β", "leak", "noticed", "after", "false shifts", "area")
+    return [head] + [
+        (
+            row["condition"],
+            f"{row['alpha']:.3g} {row['unit']}".strip(),
+            f"{row['beta']:g}",
+            f"{row['leak']:g}",
+            f"{row['detected']} of {row['came']}",
+            "–" if row["delay_m"] is None else f"{row['delay_m']:.2f} m",
+            f"{row['false_shifts']} in {row['km']:.2f} km",
+            "–" if row["area"] is None else f"{row['area']:.4f}",
+        )
+        for row in rows
+    ]

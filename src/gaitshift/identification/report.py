@@ -1,0 +1,198 @@
+"""The report of an identification: README.md and two small tables."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gaitshift.command import CONTROL_PERIOD
+from gaitshift.identification.finding import Judged, OnCourse
+from gaitshift.identification.passages import LENGTH
+from gaitshift.identification.statistics import poisson, wilson
+
+README, CONDITIONS, COURSES = "README.md", "conditions.csv", "courses.csv"
+
+Row = dict[str, Any]
+
+_TITLES = {"rough": "When rough ground begins", "flat": "When rough ground ends"}
+
+
+def condition_rows(judged: Sequence[Judged]) -> list[Row]:
+    """One row a condition: its numbers, and all courses together."""
+    return [_condition_row(one) for one in judged]
+
+
+def course_rows(judged: Sequence[Judged]) -> list[Row]:
+    """One row a condition and course."""
+    return [_course_row(one, course) for one in judged for course in one.courses]
+
+
+def write_report(
+    judged: Sequence[Judged],
+    out: Path,
+    *,
+    command: str,
+    held_out: bool,
+    pictures: Mapping[str, str],
+) -> list[Row]:
+    """Writes it into `out`; gives the rows of the conditions.
+
+    Args:
+        judged: the conditions.
+        out: a folder that exists.
+        command: what made it.
+        held_out: whether other logs judged than those that chose.
+        pictures: files in the folder, and a line on each.
+    """
+    conditions, courses = condition_rows(judged), course_rows(judged)
+    for name, rows in ((CONDITIONS, conditions), (COURSES, courses)):
+        with (out / name).open("w", newline="") as file:
+            lines = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            lines.writeheader()
+            lines.writerows(rows)
+    (out / README).write_text(_readme(judged, conditions, courses, command, held_out, pictures))
+    return conditions
+
+
+def _condition_row(one: Judged) -> Row:
+    tuned, choice = one.tuned, one.tuned.choice
+    tallies = [course.tally for course in one.courses]
+    came, detected, fired = (
+        sum(int(getattr(tally, name)[0, 0]) for tally in tallies)
+        for name in ("came", "detected", "fired")
+    )
+    km = sum(float(tally.km[0, 0]) for tally in tallies)
+    delays = [delay for course in one.courses for delay in course.delays_m]
+    areas = [area for course in one.courses if (area := one.area(course.course)) is not None]
+    return {
+        "condition": tuned.candidate.name,
+        "alpha": choice.alpha,
+        "unit": tuned.candidate.statistic.unit,
+        "beta": choice.beta,
+        "leak": choice.leak,
+        "keeps_still": choice.is_free,
+        "came": came,
+        "detected": detected,
+        "delay_m": float(np.mean(delays)) if delays else None,
+        "false_shifts": fired,
+        "km": km,
+        "area": min(area for area, _, _ in areas) if areas else None,
+    }
+
+
+def _course_row(one: Judged, course: OnCourse) -> Row:
+    tally = course.tally
+    came, detected, fired = (
+        int(getattr(tally, name)[0, 0]) for name in ("came", "detected", "fired")
+    )
+    km = float(tally.km[0, 0])
+    low, high = (x[0] for x in wilson(np.array([float(detected)]), np.array([float(came)])))
+    least, most = (x[0] for x in poisson(np.array([float(fired)]), np.array([km])))
+    delays = np.array(course.delays_m)
+    area = one.area(course.course)
+    return {
+        "condition": one.tuned.candidate.name,
+        "course": course.course,
+        "robots": tally.robots,
+        "came": came,
+        "detected": detected,
+        "detected_low": float(low) if came else None,
+        "detected_high": float(high) if came else None,
+        "delay_m": float(delays.mean()) if detected else None,
+        "delay_m_p95": float(np.quantile(delays, 0.95)) if detected else None,
+        "delay_s": float(tally.delay_s[0, 0]) if detected else None,
+        "false_shifts": fired,
+        "km": km,
+        "false_per_km": fired / km if km else None,
+        "false_per_km_low": float(least) if km else None,
+        "false_per_km_high": float(most) if km else None,
+        "area": None if area is None else area[0],
+        "area_low": None if area is None else area[1],
+        "area_high": None if area is None else area[2],
+    }
+
+
+def _readme(
+    judged: Sequence[Judged],
+    conditions: Sequence[Row],
+    courses: Sequence[Row],
+    command: str,
+    held_out: bool,
+    pictures: Mapping[str, str],
+) -> str:
+    tuned = judged[0].tuned
+    who = (
+        "Other logs judged them than chose them."
+        if held_out
+        else "The same logs chose and judged them, so the figures flatter."
+    )
+    words = (
+        f"Each condition was replayed over α, β and leaks; chosen was the soonest that never "
+        f"shifts where it should not, even at a β smaller by a quarter. {who} A step is "
+        f"{1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. Area: under the ROC "
+        f"curve of passages of {LENGTH:g} m, of the hardest course. Intervals are of 95 %."
+    )
+    parts = [f"# {_TITLES[tuned.way]}", words, f"Made by `{command}`.", "## Side by side"]
+    parts.append(_conditions_table(conditions))
+    parts += [
+        f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "
+        "chose: the one with the fewest false shifts was taken."
+        for one in judged
+        if not one.tuned.choice.is_free
+    ]
+    parts += [f"![{line}]({name})" for name, line in pictures.items()]
+    for one in judged:
+        name = one.tuned.candidate.name
+        parts += [f"## {name}", one.tuned.candidate.note.capitalize() + "."]
+        parts.append(_courses_table([row for row in courses if row["condition"] == name]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _conditions_table(rows: Sequence[Row]) -> str:
+    head = ("condition", "α", "β", "leak", "noticed", "mean delay [m]", "false shifts", "area")
+    body = [
+        (
+            row["condition"],
+            f"{row['alpha']:.3g} {row['unit']}".strip(),
+            f"{row['beta']:g}",
+            f"{row['leak']:g}",
+            f"{row['detected']} of {row['came']}",
+            _number(row["delay_m"], 2),
+            f"{row['false_shifts']} in {row['km']:.2f} km",
+            _number(row["area"], 4),
+        )
+        for row in rows
+    ]
+    return _table(head, body)
+
+
+def _courses_table(rows: Sequence[Row]) -> str:
+    head = ("course", "noticed", "delay [m]", "95 % within [m]", "delay [s]")
+    head += ("false shifts", "per km", "area")
+    body = [
+        (
+            row["course"],
+            f"{row['detected']} of {row['came']}" if row["came"] else "",
+            _number(row["delay_m"], 2),
+            _number(row["delay_m_p95"], 2),
+            _number(row["delay_s"], 2),
+            f"{row['false_shifts']} in {row['km']:.2f} km" if row["km"] else "",
+            f"{row['false_per_km_low']:.2g} to {row['false_per_km_high']:.2g}" if row["km"] else "",
+            ""
+            if row["area"] is None
+            else f"{row['area']:.4f} ({row['area_low']:.3f} to {row['area_high']:.3f})",
+        )
+        for row in rows
+    ]
+    return _table(head, body)
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"

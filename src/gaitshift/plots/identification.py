@@ -1,0 +1,134 @@
+"""What identification found: a map over α and β, and ROC curves side by side."""
+
+# matplotlib's own stubs leave **kwargs untyped:
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+
+from gaitshift.command import CONTROL_PERIOD
+from gaitshift.identification.finding import Judged, Tuned
+from gaitshift.plots.palette import GROUND, INK, PALE, PAPER, QUIET
+from gaitshift.plots.style import check_target, house_style, save
+
+_LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7b4ea3", "#8c6d46")
+"""After Okabe and Ito, as the gaits'; conditions are not gaits, and no figure shows both."""
+
+_LATEST = 6.0
+"""Delays are shaded up to here [m]."""
+
+
+def condition_map(tuned: Tuned, path: Path) -> Figure:
+    """Mean delay of a detection over α and β, where no robot shifted wrongly; and the choice."""
+    check_target(path)
+    grid, tally = tuned.grid, tuned.tally
+    quiet = tally.fired == 0
+    mostly = tally.missed < 0.5
+    delay = np.where(quiet & mostly, tally.delay_m, np.nan)
+    with house_style():
+        figure = Figure(figsize=(8.5, 5.6))
+        axes = figure.subplots()
+        axes.grid(visible=False)
+        axes.set_facecolor(PALE)
+        shades = LinearSegmentedColormap.from_list("delay", ["#0b3c5d", "#4f97c4", "#dcebf5"])
+        betas = grid.betas[1:]  # a logarithmic scale has no 0
+        mesh = axes.pcolormesh(
+            betas, grid.alphas, delay[:, 1:], cmap=shades, vmin=0.0, vmax=_LATEST, shading="nearest"
+        )
+        alarmed = np.where(~quiet, 1.0, np.nan)[:, 1:]
+        false = LinearSegmentedColormap.from_list("false", ["#f3d9c4", "#f3d9c4"])
+        axes.pcolormesh(betas, grid.alphas, alarmed, cmap=false, shading="nearest")
+        choice = tuned.choice
+        axes.plot(
+            max(choice.beta, 1.0), choice.alpha, "o", color=PAPER, markersize=9, mec=INK, mew=2
+        )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("β [counts]")
+        unit = tuned.candidate.statistic.unit
+        axes.set_ylabel(f"α [{unit}]" if unit else "α")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(FuncFormatter(_plain))
+        _name(axes, 0.98, 0.05, "no shift at all, or most missed", QUIET, "right")
+        _name(axes, 0.02, 0.05, "shifts where it should not", "#9a4a00", "left")
+        bar = cast(Any, figure.colorbar(mesh, ax=axes, pad=0.02))
+        bar.set_label("mean way until it is noticed [m]")
+        bar.outline.set_visible(False)
+        seconds = choice.beta * CONTROL_PERIOD
+        axes.set_title(
+            f"{tuned.candidate.name}: α = {choice.alpha:.3g} {unit}".rstrip()
+            + f", β = {choice.beta:g} ({seconds:.2g} s at a count a step), leak {choice.leak:g}",
+            loc="left",
+            fontsize=12,
+        )
+        figure.tight_layout()
+        save(figure, path)
+    return figure
+
+
+def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
+    """ROC curves of passages of a course against all others, a line a condition."""
+    check_target(path)
+    with house_style():
+        figure = Figure(figsize=(8.5, 5.6))
+        axes = figure.subplots()
+        rows: list[tuple[float, str, str]] = []
+        kept = [one for one in judged if one.area(course) is not None]
+        for index, one in enumerate(kept):
+            area = one.area(course)
+            x, y = roc(one.scores_on(course), one.other_scores)
+            colour = _LINES[index % len(_LINES)] if index < len(_LINES) else GROUND
+            axes.plot(x, y, color=colour, drawstyle="steps-post")
+            rows.append((area[0] if area else 0.0, one.tuned.candidate.name, colour))
+        for line, (area, name, colour) in enumerate(sorted(rows, reverse=True)):
+            axes.text(
+                1.03,
+                0.97 - 0.09 * line,
+                f"{area:.3f}  {name}",
+                color=colour,
+                transform=axes.transAxes,
+                va="top",
+                fontsize=12,
+            )
+        axes.text(1.03, 1.06, "area", color=QUIET, transform=axes.transAxes, va="top", fontsize=12)
+        axes.set_xlim(-0.01, 1.0)
+        axes.set_ylim(0.0, 1.01)
+        axes.set_xlabel("share of other passages with a shift")
+        axes.set_ylabel("share of rough passages with a shift")
+        axes.set_title(f"passages of 3 m, {course} against the rest", loc="left", fontsize=12)
+        figure.tight_layout()
+        figure.subplots_adjust(right=0.66)
+        save(figure, path)
+    return figure
+
+
+def roc(wanted: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the others, and of the wanted, with a shift at each α, the strictest first."""
+    levels = np.unique(np.concatenate([wanted, others]))[::-1]
+    x = np.array([0.0, *[(others >= level).mean() for level in levels]])
+    y = np.array([0.0, *[(wanted >= level).mean() for level in levels]])
+    return x, y
+
+
+def _plain(value: float, position: float | None) -> str:
+    return f"{value:g}"
+
+
+def _name(axes: Axes, x: float, y: float, words: str, colour: str, side: str) -> None:
+    axes.text(
+        x,
+        y if side == "left" else 1.0 - y,
+        words,
+        color=colour,
+        transform=axes.transAxes,
+        ha=side,
+        va="bottom" if side == "left" else "top",
+        fontsize=12,
+    )

@@ -1,0 +1,250 @@
+"""`gaitshift record` and `gaitshift identify`: robots whose right answer is known by hand."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gaitshift.cli import main
+from gaitshift.identification import Recording
+from gaitshift.identification.candidates import CANDIDATES
+from gaitshift.identification.finding import judge, tune
+from gaitshift.identification.passages import passage_scores
+from gaitshift.identification.statistics import auc_interval
+from gaitshift.legs import LEGS
+from gaitshift.switching import Rule
+
+PERIOD = 0.01
+FEET = np.array(
+    [[0.34, 0.21, -0.5], [0.34, -0.21, -0.5], [-0.34, 0.21, -0.5], [-0.34, -0.21, -0.5]]
+)
+
+
+def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
+    """Robots that trot at 1 m/s; from 4 s on the ground under each touch is off by ± noise [m].
+
+    On smooth ground by ± 1 mm, so that no two touches are level.
+    """
+    rng = np.random.default_rng(seed)
+    steps = round(seconds / PERIOD)
+    time = PERIOD * np.arange(1, steps + 1)
+    rough = np.broadcast_to((time > smooth)[:, None], (steps, robots))
+    if noise == 0.0:
+        rough = np.zeros_like(rough)
+    contact = np.empty((steps, robots, 4), dtype=bool)
+    feet = np.empty((steps, robots, 4, 3))
+    for robot in range(robots):
+        for leg in range(4):
+            phase = (time / 0.5 + (0.5 if leg in (1, 2) else 0.0) + 0.1 * robot) % 1.0
+            down = phase < 0.5
+            stride = np.cumsum(np.diff(down.astype(int), prepend=0) == 1)
+            level = rng.choice((-1.0, 1.0), stride[-1] + 1)
+            size = np.where(rough[:, robot], noise, 0.001)
+            contact[:, robot, leg] = down
+            feet[:, robot, leg] = FEET[leg]
+            feet[:, robot, leg, 0] += np.where(down, 0.25 - phase * 0.5, 0.0)
+            feet[:, robot, leg, 2] += np.where(down, level[stride] * size, 0.1)
+    return Recording(
+        name=name,
+        time=time,
+        contact=contact,
+        foot_position_b=feet,
+        gravity_b=np.tile([0.0, 0.0, -1.0], (steps, robots, 1)),
+        rough=rough.copy(),
+        alive=np.ones((steps, robots), dtype=bool),
+        distance=np.tile(time[:, None], (1, robots)),
+    )
+
+
+def ways():
+    return [march("flat", noise=0.0), march("into", noise=0.04, seed=1)]
+
+
+def height_candidates():
+    return [c for c in CANDIDATES if c.name in ("height_difference", "plane_residual")]
+
+
+# Tuning and judging -------------------------------------------------------------------------------
+
+
+def test_numbers_that_are_chosen_notice_noise_and_keep_still_on_smooth_ground():
+    """Touches differ by 2 mm at most on smooth ground, by 8 cm on rough: α lies in between."""
+    tuned = tune(height_candidates(), ways, way="rough")
+    for one, judged in zip(tuned, judge(tuned, ways), strict=True):
+        assert one.choice.is_free
+        tallies = {course.course: course.tally for course in judged.courses}
+        assert tallies["flat"].fired[0, 0] == 0
+        assert tallies["into"].detected[0, 0] == tallies["into"].came[0, 0] == 3
+        assert 0.0 <= max(judged.courses[1].delays_m) < 1.5, "a stride is half a metre"
+        area = judged.area("into")
+        assert area is not None
+        assert area[0] == 1.0
+        assert judged.area("flat") is None, "nothing to notice there"
+    assert 0.002 < tuned[0].choice.alpha < 0.08
+
+
+def test_judging_replays_what_a_live_condition_does():
+    """The delays of the report are those of the rule itself, step by step."""
+    (tuned,) = tune(height_candidates()[:1], ways, way="rough")
+    (judged,) = judge([tuned], ways)
+    recording = ways()[1]
+    values, rule = recording.values(tuned.candidate.statistic), tuned.rule
+    expected = []
+    for robot in range(recording.robots):
+        k = np.zeros(1)
+        for t in range(len(recording.time)):
+            k = rule.step(k, values[t, robot : robot + 1])
+            if rule.fires(k, np.ones(1))[0]:
+                entry = recording.rough[:, robot].argmax()
+                expected.append(recording.distance[t, robot] - recording.distance[entry, robot])
+                break
+    assert sorted(judged.courses[1].delays_m) == pytest.approx(sorted(expected))
+
+
+def test_the_way_back_notices_that_rough_ground_has_ended():
+    ahead = march("out-of", noise=0.04, seed=2)
+    turned = {
+        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
+    }
+
+    def out():
+        return [replace(ahead, **turned)]
+
+    (tuned,) = tune(height_candidates()[:1], out, way="flat")
+    assert tuned.rule.when == "below"
+    (judged,) = judge([tuned], out)
+    assert judged.courses[0].tally.detected[0, 0] == 3
+    assert judged.courses[0].tally.fired[0, 0] == 0
+
+
+def test_a_condition_whose_signals_are_missing_is_left_out():
+    slip = [c for c in CANDIDATES if c.name in ("slip", "height_difference")]
+    assert [t.candidate.name for t in tune(slip, ways, way="rough")] == ["height_difference"]
+
+
+# Passages -----------------------------------------------------------------------------------------
+
+
+def test_passages_are_cut_at_their_length_at_the_border_and_at_a_fall():
+    """4 m smooth and 8 m rough: one whole passage of 3 m, then two; after a fall none."""
+    recording = march("into", noise=0.04, robots=1)
+    values = np.ones((len(recording.time), 1, 1))
+    rule, alphas = Rule(alpha=1.0, beta=50.0), np.array([0.5, 2.0])
+    scores = passage_scores(recording, values, rule, alphas)
+    assert scores == {False: [1], True: [1, 1]}, "of the two α only 0.5 lies below 1"
+    patient = replace(rule, beta=299.5)
+    assert passage_scores(recording, values, patient, alphas) == {False: [1], True: [1, 1]}
+    too_patient = replace(rule, beta=310.0)
+    assert passage_scores(recording, values, too_patient, alphas) == {False: [0], True: [0, 0]}
+    alive = recording.alive.copy()
+    alive[750:] = False
+    fallen = passage_scores(replace(recording, alive=alive), values, rule, alphas)
+    assert fallen == {False: [1], True: [1]}
+
+
+def test_the_interval_of_an_area_is_wide_where_trials_are_few():
+    low, high = auc_interval(1.0, 30, 2000)
+    assert high == pytest.approx(1.0)
+    assert low == pytest.approx(1.0 - 1.96**2 / (30 + 1.96**2), abs=1e-3), "Wilson's, at 30 of 30"
+
+
+# The commands -------------------------------------------------------------------------------------
+
+
+def table(path, recording):
+    """Robot 0 of a recording as a CSV file."""
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file)
+        head = ["time", "rough", "roll", "pitch", *(f"contact_{leg}" for leg in LEGS)]
+        rows.writerow([*head, *(f"foot_{leg}_{axis}" for leg in LEGS for axis in "xyz")])
+        for t in range(len(recording.time)):
+            rows.writerow(
+                [
+                    f"{recording.time[t]:.2f}",
+                    int(recording.rough[t, 0]),
+                    0.0,
+                    0.0,
+                    *recording.contact[t, 0].astype(int),
+                    *recording.foot_position_b[t, 0].ravel(),
+                ]
+            )
+    return path
+
+
+def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
+    log = table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1))
+    out = tmp_path / "report"
+    command = ["identify", str(log), "--condition", "all", "--out", str(out), "--json"]
+    main(command)
+    rows = json.loads(capsys.readouterr().out)["conditions"]
+    names = [row["condition"] for row in rows]
+    assert {"paper", "height_difference", "touchdown_surprise", "oracle"} <= set(names)
+    assert "slip" not in names, "the table has no velocity"
+    readme = (out / "README.md").read_text()
+    for name in names:
+        assert f"## {name}" in readme
+        assert (out / f"{name}.png").stat().st_size < 300_000
+    assert "the same logs" in readme.lower()
+    with (out / "courses.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(names)
+    with pytest.raises(SystemExit) as end:
+        main(command)
+    assert end.value.code == 2, "a report that is there is not overwritten unasked"
+    assert "--overwrite" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "record"),
+        (["nowhere.npz"], "no log file nowhere.npz"),
+        (["README.md"], ".npz"),
+        (["{log}", "--condition", "guess"], "no condition 'guess'"),
+        (["{log}", "--condition", "slip"], "lack the signals"),
+        (["{smooth}"], "no rough ground"),
+    ],
+)
+def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
+    logs = {
+        "log": table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1)),
+        "smooth": table(tmp_path / "flat.csv", march("flat", noise=0.0, robots=1)),
+    }
+    given = [argument.format(**logs) for argument in arguments]
+    with pytest.raises(SystemExit) as end:
+        main(["identify", *given, "--out", str(tmp_path / "report")])
+    assert end.value.code == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert message in error
+    assert not (tmp_path / "report").exists()
+
+
+def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys):
+    logs = tmp_path / "logs"
+    command = ["record", "trot", "--out", str(logs), "--courses", "flat", "into-0.20"]
+    command += ["--robots", "8", "--seconds", "9", "--json"]
+    main(command)
+    rows = json.loads(capsys.readouterr().out)["logs"]
+    assert [row["robots"] for row in rows] == [8, 8]
+    before = [path.stat().st_mtime_ns for path in sorted(logs.iterdir())]
+    main(command)
+    assert "kept" in capsys.readouterr().err
+    assert [path.stat().st_mtime_ns for path in sorted(logs.iterdir())] == before
+    files = [str(path) for path in sorted(logs.iterdir())]
+    main(["identify", *files, "--out", str(tmp_path / "report"), "--json"])
+    (row,) = json.loads(capsys.readouterr().out)["conditions"]
+    assert row["condition"] == "touchdown_surprise"
+    assert row["false_shifts"] == 0
+    assert row["detected"] >= 7
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [([], "trot"), (["trot", "--courses", "moon"], "no course 'moon'"), (["moon"], "no policy")],
+)
+def test_bad_input_of_record_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
+    with pytest.raises(SystemExit) as end:
+        main(["record", *arguments, "--out", str(tmp_path / "logs")])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
