@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from gaitshift.cli import main
-from gaitshift.identification import Recording
+from gaitshift.errors import GaitshiftError
+from gaitshift.identification import Recording, auc
 from gaitshift.identification.candidates import CANDIDATES
+from gaitshift.identification.classifier import RoughnessClassifier
 from gaitshift.identification.finding import judge, tune
 from gaitshift.identification.passages import passage_scores
 from gaitshift.identification.statistics import auc_interval
@@ -174,13 +176,17 @@ def table(path, recording):
 
 
 def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
-    log = table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1))
+    logs = [
+        str(table(tmp_path / f"walk{seed}.csv", march("into", noise=0.04, robots=1, seed=seed)))
+        for seed in range(4)
+    ]
     out = tmp_path / "report"
-    command = ["identify", str(log), "--condition", "all", "--out", str(out), "--json"]
+    command = ["identify", *logs, "--condition", "all", "--out", str(out), "--json"]
     main(command)
     rows = json.loads(capsys.readouterr().out)["conditions"]
     names = [row["condition"] for row in rows]
-    assert {"paper", "height_difference", "touchdown_surprise", "oracle"} <= set(names)
+    wanted = {"paper", "height_difference", "touchdown_surprise", "oracle", "classifier"}
+    assert wanted <= set(names)
     assert "slip" not in names, "the table has no velocity"
     readme = (out / "README.md").read_text()
     for name in names:
@@ -188,7 +194,7 @@ def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
         assert (out / f"{name}.png").stat().st_size < 300_000
     assert "the same logs" in readme.lower()
     with (out / "courses.csv").open() as file:
-        assert len(list(csv.DictReader(file))) == len(names)
+        assert len(list(csv.DictReader(file))) == len(names) * len(logs)
     with pytest.raises(SystemExit) as end:
         main(command)
     assert end.value.code == 2, "a report that is there is not overwritten unasked"
@@ -248,3 +254,36 @@ def test_bad_input_of_record_is_one_line_and_code_2(tmp_path, capsys, arguments,
         main(["record", *arguments, "--out", str(tmp_path / "logs")])
     assert end.value.code == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+# The classifier -----------------------------------------------------------------------------------
+
+
+def test_a_classifier_is_judged_on_robots_that_it_never_saw():
+    """Labels of pure chance: what it has learned by heart helps it on its own robots alone."""
+    rng = np.random.default_rng(4)
+    noise = march("noise", noise=0.0, robots=2)
+    chance = replace(noise, rough=rng.random((len(noise.time) // 50, 2)).repeat(50, axis=0) < 0.5)
+    classifier = RoughnessClassifier.fit([chance])
+    truth = chance.rough.ravel()
+    areas = []
+    for crosswise in (False, True):
+        likely = classifier.probability(chance, crosswise=crosswise).ravel()
+        areas.append(auc(likely[truth][:, None], likely[~truth][:, None])[0])
+    assert areas[0] > 0.9
+    assert areas[1] < 0.7
+
+
+def test_a_classifier_learns_what_rough_ground_is():
+    classifier = RoughnessClassifier.fit(ways())
+    other = march("into", noise=0.04, seed=9)
+    likely = classifier.probability(other, crosswise=False)[..., 0]
+    assert likely[150:380].mean() < 0.1
+    assert likely[600:].mean() > 0.9
+
+
+@pytest.mark.parametrize(("rough", "says"), [(True, "rough"), (False, "smooth")])
+def test_a_classifier_needs_both_labels(rough, says):
+    one_kind = march("flat", noise=0.0)
+    with pytest.raises(GaitshiftError, match=f"all labels are {says}"):
+        RoughnessClassifier.fit([replace(one_kind, rough=np.full_like(one_kind.rough, rough))])

@@ -3,7 +3,7 @@
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -49,6 +49,7 @@ class Identify:
         try:
             from gaitshift.identification import report as reports
             from gaitshift.identification.candidates import candidates
+            from gaitshift.identification.classifier import NAME, RoughnessClassifier
             from gaitshift.identification.finding import judge, tune
             from gaitshift.identification.sources import check_sources
         except ImportError as error:
@@ -58,13 +59,24 @@ class Identify:
         if not self.logs:
             raise GaitshiftError("which logs? make some with: gaitshift record trot --out logs")
         names = () if "all" in self.condition else self.condition
-        wanted = candidates(names)
+        wanted = list(candidates(tuple(name for name in names if name != NAME)))
+        if names == (NAME,):
+            wanted = []
         check_sources((*self.logs, *self.held_out))
         check_folder(self.out, overwrite=self.overwrite, ours=(REPORT, CONDITIONS, COURSES, ROC))
-        tuned = tune(wanted, _reader(self.logs), way=self.way, report=_tell("choosing"))
+        read = _reader(self.logs)
+        classifier: RoughnessClassifier | None = None
+        if not names or NAME in names:
+            say("fitting the classifier")
+            classifier = RoughnessClassifier.fit(read())
+            wanted.append(classifier.candidate(crosswise=True))
+        tuned = tune(wanted, read, way=self.way, report=_tell("choosing"))
         missing = {c.name for c in wanted} - {t.candidate.name for t in tuned}
         if names and missing:
             raise GaitshiftError(f"the logs lack the signals of '{min(missing)}'")
+        if classifier is not None:
+            known = classifier.candidate(crosswise=False)
+            tuned = [replace(t, candidate=known) if t.candidate.name == NAME else t for t in tuned]
         judges = self.held_out or self.logs
         judged = judge(tuned, _reader(judges), report=_tell("judging"))
         self.out.mkdir(parents=True, exist_ok=True)

@@ -159,5 +159,6 @@ def candidates(names: tuple[str, ...]) -> tuple[Candidate, ...]:
     known = tuple(candidate.name for candidate in CANDIDATES)
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise GaitshiftError(f"no condition '{unknown[0]}'; known: {', '.join(known)}")
+        listed = ", ".join((*known, "classifier"))
+        raise GaitshiftError(f"no condition '{unknown[0]}'; known: {listed}, or all")
     return tuple(c for c in CANDIDATES if not names or c.name in names)
