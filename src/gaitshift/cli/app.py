@@ -16,6 +16,7 @@ from gaitshift.cli.output import say
 from gaitshift.cli.record import Record
 from gaitshift.cli.reproduce import Reproduce
 from gaitshift.cli.train import Train
+from gaitshift.cli.transitions import Transitions
 from gaitshift.errors import GaitshiftError
 
 Command = (
@@ -26,6 +27,7 @@ Command = (
     | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Transitions, tyro.conf.subcommand("transitions")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
 

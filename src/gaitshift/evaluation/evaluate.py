@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from gaitshift.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.errors import GaitshiftError
@@ -92,13 +93,9 @@ def run_policy(
     )
     driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
     speed = policy.info.forward_speed if config.speed is None else config.speed
-    world = World(policy.robot, _grounds(config, speed), config.episodes, gains=policy.info.gains)
-    start = np.zeros((config.episodes, 2))
-    # Spread over the width, so that robots on one field do not walk over the same ground.
-    start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, config.episodes)
-    # Spread over a stride, so that robots meet an edge at all instants of it.
-    stride = policy.info.forward_speed / policy.info.stride_frequency
-    start[:, 0] = rng.uniform(-stride / 2, stride / 2, config.episodes)
+    grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
+    world = World(policy.robot, grounds, config.episodes, gains=policy.info.gains)
+    start = starts(config.episodes, policy, rng)
     return rollout(world, driver, run, start_xy=start, rng=rng, finish_x=finish_x, report=report)
 
 
@@ -107,13 +104,28 @@ def field_length(speed: float, seconds: float) -> float:
     return 2 * RUN_UP + 1.25 * speed * seconds
 
 
-def _grounds(config: EvaluationConfig, speed: float) -> list[Terrain]:
-    """The grounds that robots share: one where all seeds give the same, else `FIELDS`."""
-    length = field_length(speed, config.seconds)
-    seeds = range(FIELDS * config.seed, FIELDS * (config.seed + 1))
+def starts(n: int, policy: Policy, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
+    """Where n robots begin [m].
+
+    Spread over the width, so that robots on one field do not walk over the same ground, and over a
+    stride, so that they meet an edge at all instants of it.
+    """
+    start = np.zeros((n, 2))
+    start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, n)
+    stride = policy.info.forward_speed / policy.info.stride_frequency
+    start[:, 0] = rng.uniform(-stride / 2, stride / 2, n)
+    return start
+
+
+def grounds_of(terrain: str, *, seed: int, speed: float, seconds: float) -> list[Terrain]:
+    """The grounds that robots share: one where all seeds give the same, else `FIELDS`.
+
+    They begin `RUN_UP` behind the start, and are long enough for a speed [m/s] and time [s].
+    """
+    length = field_length(speed, seconds)
     grounds: list[Terrain] = []
-    for seed in seeds:
-        ground = from_spec(config.terrain, seed=seed, length=length, width=FIELD_WIDTH)
+    for each in range(FIELDS * seed, FIELDS * (seed + 1)):
+        ground = from_spec(terrain, seed=each, length=length, width=FIELD_WIDTH)
         if grounds and np.array_equal(ground.height, grounds[0].height):
             break
         grounds.append(ground)

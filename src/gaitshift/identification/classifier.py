@@ -104,8 +104,8 @@ class RoughnessClassifier:
             first, second = (_likely(model, flat).reshape(steps, robots) for model in self.models)
         likely = (first + second) / 2
         if crosswise:
-            learned_by_first = (self.halves[_key(recording)] + np.arange(robots)) % 2 == 0
-            likely = np.where(cast(np.ndarray, learned_by_first), second, first)
+            half = cast(Any, (self.halves[_key(recording)] + np.arange(robots)) % 2)
+            likely = np.where(half == 0, second, first)
         return np.repeat(likely, _EVERY, axis=0)[: len(recording.time), :, None]
 
     def candidate(self, *, crosswise: bool) -> Candidate:

@@ -1,0 +1,147 @@
+"""`gaitshift transitions`: every gait swapped for every other, at any instant."""
+
+import shlex
+import sys
+from dataclasses import dataclass
+from itertools import permutations
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+
+from gaitshift import policy as policies
+from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
+from gaitshift.errors import GaitshiftError
+
+TABLE, README = "transitions.csv", "README.md"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transitions:
+    """Swap gaits in an instant: every ordered pair, at every phase of the stride.
+
+    A shift succeeds when the robot does not fall within 5 s and shows the new gait. Writes
+    transitions.csv, README.md and a heat map a ground. Pairs that the table has already are kept,
+    so that a command that was broken off goes on.
+    """
+
+    gaits: Annotated[tuple[str, ...], tyro.conf.Positional] = ("trot", "pace", "bound")
+    """Gaits by name; `all` for every shipped one."""
+    grounds: tuple[str, ...] = ("flat", "perlin:0.10")
+    """Grounds, as in `evaluate --terrain`."""
+    switches: int = 512
+    """Shifts of each pair on each ground."""
+    seed: int = 0
+    """Seed of grounds, starts and instants."""
+    out: Path
+    """Folder of the results."""
+    overwrite: bool = False
+    """Begin anew where there are results already."""
+    json: bool = False
+    """One JSON object on stdout."""
+
+    def run(self) -> None:
+        """Shifts, and tells what came of it."""
+        try:
+            from gaitshift.studies import Pair, run_pair
+            from gaitshift.studies.transition_table import is_of, read_rows, row_of, write_rows
+        except ImportError as error:
+            raise GaitshiftError(
+                f"transitions needs the package '{error.name}'; install gaitshift[identify]"
+            ) from error
+        names = policies.shipped() if self.gaits == ("all",) else self.gaits
+        if len(set(names)) < 2:
+            raise GaitshiftError("a shift needs two gaits or more")
+        if not 1 <= self.switches <= 1_000_000:
+            raise GaitshiftError(f"{self.switches} switches: 1 to 1000000 would be right")
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+        loaded = {name: policies.load(name) for name in names}
+        path = self.out / TABLE
+        if not path.is_file():
+            check_folder(self.out, overwrite=self.overwrite, ours=(TABLE, README))
+        rows = [] if self.overwrite else read_rows(path)
+        self.out.mkdir(parents=True, exist_ok=True)
+        for ground in self.grounds:
+            for old, new in permutations(names, 2):
+                pair = Pair(old, new)
+                if any(is_of(row, pair, ground, self.seed, self.switches) for row in rows):
+                    say(f"{old} to {new} on {ground} is there already, and kept")
+                    continue
+                with progress(f"{old} to {new}, {ground}") as report:
+                    outcomes = run_pair(
+                        loaded,
+                        pair,
+                        ground=ground,
+                        switches=self.switches,
+                        seed=self.seed,
+                        report=report,
+                    )
+                rows.append(row_of(pair, ground, self.seed, outcomes))
+                write_rows(rows, path)
+        self._write(rows)
+        if self.json:
+            emit_json({"out": str(self.out), "transitions": rows})
+        else:
+            emit_table(f"shifts, {self.switches} each; more in {self.out}", _table(rows))
+
+    def _write(self, rows: list[dict[str, Any]]) -> None:
+        """README.md and the maps of all that the table has."""
+        from gaitshift.plots.transitions import transition_map
+
+        parts = [
+            "# Shifts in an instant",
+            "Policy and machine are swapped at an instant drawn from a whole stride of the old "
+            "gait. A shift succeeds when the robot does not fall within 5 s and every stride from "
+            "some moment on shows the new gait for half of its steps or more; settle time: until "
+            "the first such stride is over. Dip: how far the mean speed of a stride falls below "
+            "the slower of the two commands. Intervals are Wilson's, of 95 %.",
+            f"Made by `{shlex.join(['gaitshift', *sys.argv[1:]])}`.",
+        ]
+        for ground in dict.fromkeys(row["ground"] for row in rows):
+            of = [row for row in rows if row["ground"] == ground]
+            picture = f"{ground.replace(':', '-')}.png"
+            transition_map(of, self.out / picture)
+            total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
+            lines = [
+                "| from | to | succeeded | interval | fell | settled, 95 % within [s] "
+                "| dip [m/s] | tilt, 95 % within [°] | worst phase |",
+                "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+            ]
+            lines += [f"| {' | '.join(_readme_cells(row))} |" for row in of]
+            parts += [
+                f"## {ground}",
+                f"{good} of {total} shifts succeeded.",
+                f"![Failed shifts on {ground}]({picture})",
+                "\n".join(lines),
+            ]
+        (self.out / README).write_text("\n\n".join(parts) + "\n")
+
+
+def _readme_cells(row: dict[str, Any]) -> tuple[str, ...]:
+    return (
+        row["old"],
+        row["new"],
+        f"{row['successes']} of {row['switches']}",
+        f"{row['low']:.4f} to {row['high']:.4f}",
+        str(row["fell"]),
+        str(row["settle_s_p95"]),
+        f"{row['dip_m_s']:.2f}",
+        f"{row['tilt_deg_p95']:.0f}",
+        f"{row['worst_phase']}: {row['worst_phase_success']:.3f}",
+    )
+
+
+def _table(rows: list[dict[str, Any]]) -> list[tuple[str, ...]]:
+    head = ("from", "to", "ground", "succeeded", "fell", "settled within")
+    return [head] + [
+        (
+            row["old"],
+            row["new"],
+            row["ground"],
+            f"{row['successes']} of {row['switches']}",
+            str(row["fell"]),
+            f"{row['settle_s_p95']} s",
+        )
+        for row in rows
+    ]
