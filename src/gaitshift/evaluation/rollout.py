@@ -1,4 +1,4 @@
-"""Runs N robots with their drivers and switchers, and keeps the log."""
+"""Runs N robots with their controllers and switchers, and keeps the log."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -9,7 +9,7 @@ from jaxtyping import Float
 from gaitshift.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
 from gaitshift.log import Log
 from gaitshift.motion import Motion
-from gaitshift.switching import Decision, Driver, Switcher
+from gaitshift.switching import Controller, Decision, Switcher
 from gaitshift.world import PushConfig, Pusher, World
 
 
@@ -40,7 +40,7 @@ class RolloutConfig:
 
 def rollout(
     world: World,
-    driver: Driver,
+    driver: Controller,
     config: RolloutConfig,
     *,
     start_xy: Float[np.ndarray, "N 2"],
@@ -89,7 +89,7 @@ def rollout(
 
 
 def _command(
-    config: RolloutConfig, motion: Motion, driver: Driver, start_xy: Float[np.ndarray, "N 2"]
+    config: RolloutConfig, motion: Motion, driver: Controller, start_xy: Float[np.ndarray, "N 2"]
 ) -> Command:
     own, n = driver.own_command(), driver.n
     lateral = motion.base_position_w[:, 1] - start_xy[:, 1]
@@ -117,7 +117,7 @@ _KEPT_AS = {
 class _Recorder:
     """Collects what a `Log` is made of."""
 
-    def __init__(self, world: World, driver: Driver) -> None:
+    def __init__(self, world: World, driver: Controller) -> None:
         self._world = world
         self._driver = driver
         self._columns: dict[str, list[np.ndarray]] = {}

@@ -13,7 +13,7 @@ from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.log import Log
 from gaitshift.motion import Motion
 from gaitshift.policy import Policy
-from gaitshift.switching import Decision, Driver
+from gaitshift.switching import Controller, Decision, Driver
 from gaitshift.world import World
 
 GROUNDS = ("flat", "perlin:0.10")
@@ -94,7 +94,7 @@ class _AtSteps:
     step_of: Int[np.ndarray, " N"]
     gait: str
 
-    def step(self, time: float, motion: Motion, driver: Driver) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Changes those that are due in the control step that ends at `time`."""
         now = round(time / CONTROL_PERIOD)
         driver.switch(np.flatnonzero(self.step_of == now), self.gait, motion)

@@ -3,6 +3,7 @@
 from gaitshift.switching.attitude import AttitudeVariance as AttitudeVariance
 from gaitshift.switching.condition import Condition as Condition
 from gaitshift.switching.condition import ConditionState as ConditionState
+from gaitshift.switching.controller import Controller as Controller
 from gaitshift.switching.driver import Driver as Driver
 from gaitshift.switching.energy import CostOfTransport as CostOfTransport
 from gaitshift.switching.graph import Edge as Edge

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.motion import Motion
-from gaitshift.switching.driver import Driver
+from gaitshift.switching.controller import Controller
 from gaitshift.switching.graph import GaitGraph
 from gaitshift.switching.height_difference import HeightDifference
 from gaitshift.switching.signals import Signals
@@ -32,9 +32,9 @@ class Decision:
 
 @runtime_checkable
 class Switcher(Protocol):
-    """Looks at the motion once a control step and changes gaits through the driver."""
+    """Looks at the motion once a control step and changes gaits through what drives them."""
 
-    def step(self, time: float, motion: Motion, driver: Driver) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Decides for all robots at `time` [s]."""
         ...
 
@@ -56,7 +56,7 @@ class Autonomous:
         self._k = np.zeros((n, len(graph.edges)))
         self._time_in_gait = np.zeros(n)
 
-    def step(self, time: float, motion: Motion, driver: Driver) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Lets the edges count; where one fires, the robot changes to the gait it leads to."""
         signals = Signals.from_motion(motion, time=time, command=driver.command)
         values: dict[str, np.ndarray] = {}
@@ -68,7 +68,7 @@ class Autonomous:
         return decision
 
     def _count(
-        self, signals: Signals, values: dict[str, np.ndarray], driver: Driver
+        self, signals: Signals, values: dict[str, np.ndarray], driver: Controller
     ) -> tuple[Decision, Bool[np.ndarray, "N E"]]:
         """Moves the counters of the edges that leave each robot's gait: which of them fire."""
         n = len(self._k)
@@ -87,7 +87,7 @@ class Autonomous:
         height = np.nan_to_num(self._memory[self._heights])  # of feet that never touched: 0
         return Decision(k=k, threshold=threshold, foot_height=height), fire
 
-    def _shift(self, fire: Bool[np.ndarray, "N E"], motion: Motion, driver: Driver) -> None:
+    def _shift(self, fire: Bool[np.ndarray, "N E"], motion: Motion, driver: Controller) -> None:
         edges = self.graph.edges
         free = np.ones(len(self._k), dtype=bool)
         for index in sorted(range(len(edges)), key=lambda i: -edges[i].priority):
@@ -106,7 +106,7 @@ class Scheduled:
     plan: tuple[tuple[float, str], ...]
     """Times [s] and the gait that begins there, in order."""
 
-    def step(self, time: float, motion: Motion, driver: Driver) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Carries out what fell due in the control step that ends at `time`."""
         late = time + _ROUNDING
         for start, gait in self.plan:

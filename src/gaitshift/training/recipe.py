@@ -66,6 +66,9 @@ class Stage:
     swing_factor: float = 1.0
     """Factor on the swing heights that the gait asks for; ours: feet that swing 14 cm high, where
     10 cm is enough on level ground, do not catch on steps."""
+    landing: float = 0.0
+    """Factor on the price of hard landings; ours: none while a gait is learned, whose feet find the
+    ground by falling on it."""
     kl_factor: float = 1.0
     """Factor on PPO's `desired_kl`; ours: on rough ground larger steps come further."""
 
@@ -94,6 +97,7 @@ class Recipe:
             step=0.12,
             push=130.0,
             swing_factor=1.4,
+            landing=1.0,
             kl_factor=2.0,
         ),
     )
