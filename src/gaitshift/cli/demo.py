@@ -64,7 +64,8 @@ class Demo(DemoConfig):
 
     def run(self) -> None:
         """Runs, draws, and says where to look."""
-        policies = {gait: policy.load(gait) for gait in self.used}
+        learned = self.controller == "policy"
+        policies = {gait: policy.load(gait) for gait in self.used} if learned else {}
         files = (VIDEO, PICTURE, LOG, SUMMARY)
         check_folder(self.out, overwrite=self.overwrite, ours=files)
         with progress("walking") as report:

@@ -3,16 +3,18 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from gaitshift.cpg import GAITS, CpgController
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.log import Log
 from gaitshift.policy import Policy
 from gaitshift.switching import (
     Autonomous,
+    Controller,
     Driver,
     GaitGraph,
     Scheduled,
@@ -60,6 +62,9 @@ class DemoConfig:
     """β': shift back when k exceeds it [counts]."""
     hold: float | None = None
     """Least time in either gait [s]."""
+    controller: Literal["policy", "cpg"] = "policy"
+    """What walks: trained policies, or coupled oscillators that learned nothing (trot, pace, bound,
+    walk), which go slowly and for low noise alone."""
     graph: str = ""
     """A gait graph in place of the two gaits and their condition: a shipped one by name, or a
     TOML file."""
@@ -124,11 +129,11 @@ def run_demo(
     """Runs the demonstration: the log of all robots, and a summary for each."""
     n = config.episodes
     rng = np.random.default_rng(config.seed)
-    driver = Driver({gait: policies[gait] for gait in config.used}, n, start=config.used[0])
+    driver = _controller(config, policies)
     switcher = _switcher(config)
     grounds = [_ground(config, config.seed + i) for i in range(n)]
     finish = _finish(config, grounds[0])
-    slowest = min(policies[gait].info.forward_speed for gait in config.used)
+    slowest = _slowest(config, policies)
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
     world = World(driver.robot, grounds, n, gains=driver.gains)
     start = np.tile([START, 0.0], (n, 1))
@@ -173,6 +178,20 @@ def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
             for t in shifts
         ],
     }
+
+
+def _controller(config: DemoConfig, policies: Mapping[str, Policy]) -> Controller:
+    used, n = config.used, config.episodes
+    if config.controller == "cpg":
+        return CpgController(used, n, start=used[0])
+    return Driver({gait: policies[gait] for gait in used}, n, start=used[0])
+
+
+def _slowest(config: DemoConfig, policies: Mapping[str, Policy]) -> float:
+    """Speed of the slowest gait that appears [m/s]."""
+    if config.controller == "cpg":
+        return min(GAITS[gait].speed for gait in config.used)
+    return min(policies[gait].info.forward_speed for gait in config.used)
 
 
 def _switcher(config: DemoConfig) -> Switcher:
