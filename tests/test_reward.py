@@ -38,7 +38,6 @@ CONFIG = replace(
     power=-0.5,
     chatter=-7.0,
     action_rate=-0.02,
-    landing=-2.0,
 )
 """Table I and round numbers for what is ours."""
 STANCE = np.array([0.1, -0.2, 0.3, -0.4, 0.5, -0.6, 0.7, -0.8, 0.9, -1.0, 1.1, -1.2])
@@ -107,7 +106,6 @@ def three_robots():
         "agreement": np.array([1.0, 0.75, 0.5]),
         "chatter": np.array([2.0, 0.0, 0.75]),
         "action_change": np.stack([0.1 * RAMP, np.zeros(12), -np.ones(12)]),
-        "impact": np.array([0.25, 0.0, 4.5]),
     }
 
 
@@ -142,8 +140,6 @@ HAND_TABLE = {
     "chatter": (-14.0, 0.0, -5.25),
     # -0.02 · 0.01 · 650; nothing; -0.02 · 12
     "action_rate": (-0.13, 0.0, -0.24),
-    # -2 · 0.25; no foot; -2 · 4.5
-    "landing": (-0.5, 0.0, -9.0),
 }
 
 
@@ -190,7 +186,6 @@ def test_perfect_motion_earns_every_reward_whole_and_no_penalty():
         stance=STANCE,
         agreement=np.ones(1),
         chatter=np.zeros(1),
-        impact=np.zeros(1),
         action_change=np.zeros((1, 12)),
     )
     earned = {name: term.item() for name, term in terms.items() if term.item() != 0}

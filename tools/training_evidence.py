@@ -39,16 +39,17 @@ SEEDS_HEAD = """# Five fresh seeds
 
 The flat stage of the default recipe alone ({iterations} iterations, {steps:.1f} million control
 steps, about five minutes on one core), for five seeds that are not those of the shipped policies.
-Each policy is judged on flat ground, 64 robots for 12 s, by the limits of `gaitshift evaluate`.
+Each policy is judged on flat ground, 64 robots for 12 s, by the limits of `gaitshift evaluate`,
+whose speed loop trims the asked speed; open loop: the mean speed without it.
 This page is made by `python tools/training_evidence.py seeds`.
 """
 ADDITIONS_HEAD = """# The additions to Table I, taken away
 
 Trot on the flat stage of the default recipe ({iterations} iterations), whole and without each of
-the seven terms that the reward adds to the paper's Table I and of the two manners of a change that
-the bonus depends on (`gaitshift.reward.ADDITIONS`, `BONUS_SHARES`): means over three seeds, each
-policy judged on flat ground, 64 robots for 12 s. Clean: how many of the three keep all limits of
-`gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
+the seven terms that the reward adds to the paper's Table I, and of the two manners
+of a change that the bonus depends on (`gaitshift.reward.ADDITIONS`, `BONUS_SHARES`): means over
+three seeds, each policy judged on flat ground, 64 robots for 12 s. Clean: how many of the three
+keep all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
 This page is made by `python tools/training_evidence.py additions`.
 """
 
@@ -95,7 +96,14 @@ def write_seeds(processes: int) -> Path:
     """The table of fresh seeds."""
     jobs = jobs_of([setting()], FIRST_GAITS, FRESH_SEEDS)
     figures = judged(jobs, processes)
-    head = ("gait", "seed", "verdict", "survival", "speed [m/s]", "cycles [Hz]", "pattern")
+    unaided = {
+        job.name: evaluate(policy.load(RUNS / job.name / POLICY), replace(JUDGED, open_loop=True))[
+            0
+        ]
+        for job in jobs
+    }
+    head = ("gait", "seed", "verdict", "survival", "speed [m/s]", "open loop [m/s]", "cycles [Hz]")
+    head += ("pattern",)
     head += ("touchdowns a cycle", "least consistency", "least clearance [cm]", "CoT", "misses")
     rows: list[tuple[str, ...]] = []
     for job in jobs:
@@ -108,6 +116,7 @@ def write_seeds(processes: int) -> Path:
                 f"{verdict['gait']}, {'clean' if verdict['clean'] else 'not clean'}",
                 f"{one['survival']:.2f}",
                 f"{one['speed_mean']:.2f}",
+                f"{unaided[job.name]['speed_mean']:.2f}",
                 f"{one['cycles_per_s']:.2f}",
                 f"{one['pattern_fraction']:.2f}",
                 " ".join(f"{x:.2f}" for x in one["touchdowns_per_cycle"]),

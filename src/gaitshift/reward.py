@@ -24,7 +24,6 @@ ADDITIONS = (
     "power",
     "chatter",
     "action_rate",
-    "landing",
 )
 """The terms that are ours; every other one is Table I's."""
 
@@ -70,9 +69,6 @@ class RewardConfig:
     environment's strictness; ours: one touchdown a swing is clean, and free at any frequency."""
     action_rate: float = -0.02
     """Times ‖a - a_last‖²; ours: smooth targets."""
-    landing: float = -1.0
-    """Times Σ v² of the feet that come down, with their downward speed a step before [s²/m²]; ours:
-    feet that are asked to swing high slam down at 5 m/s, and bounce."""
     bonus: float = 200.0
     """b, paid when the machine changes its state (paper III-C)."""
     bonus_swing: float = 1.0
@@ -106,7 +102,6 @@ def walk_reward(
     agreement: Float[np.ndarray, " N"],
     chatter: Float[np.ndarray, " N"],
     action_change: Float[np.ndarray, "N 12"],
-    impact: Float[np.ndarray, " N"],
     penalty_scale: float = 1.0,
 ) -> RewardTerms:
     """R_walk, term by term (Table I and the additions).
@@ -119,7 +114,6 @@ def walk_reward(
         agreement: share of the feet that are as the stance of the machine's state has them.
         chatter: number of feet that came down out of place, times the present strictness.
         action_change: action minus the action before it.
-        impact: sum of the squared downward speeds of the feet that came down [m²/s²].
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """
     velocity = motion.base_linear_velocity_b
@@ -142,7 +136,6 @@ def walk_reward(
         "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
         "chatter": config.chatter * chatter,
         "action_rate": config.action_rate * _squares(action_change),
-        "landing": config.landing * impact,
     }
     return {
         name: penalty_scale * term if getattr(config, name) < 0 else term

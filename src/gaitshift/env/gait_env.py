@@ -56,8 +56,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         depends on swing heights and punctuality, and factor on the price of chatter."""
         self.swing_factor = 1.0
         """Factor on the machine's swing heights now."""
-        self.landing_scale = 1.0
-        """Factor on the price of hard landings now."""
         self.command_scale = 1.0
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.penalty_scale = 1.0
@@ -97,9 +95,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         dwell = self.machine.dwell_for(self._command.stride)
         step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
         on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
-        chatter, swing_share, impact = self._swings.see(
-            self._state, step, motion, self.swing_factor
-        )
+        chatter, swing_share = self._swings.see(self._state, step, motion, self.swing_factor)
         self._touch_height = last_touch(motion, self._touch_height)
         self._state = step.state
         self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
@@ -112,7 +108,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             agreement=agreement,
             chatter=self.strictness * chatter,
             action_change=action - self._last_action,
-            impact=self.landing_scale * impact,
             penalty_scale=self.penalty_scale,
         )
         bonus = earned_bonus(

@@ -8,7 +8,7 @@ from gaitshift.reward_machine import RewardMachine, Step
 
 
 class Swings:
-    """The swings of N robots' feet: how high they went, and how they ended.
+    """The swings of N robots' feet: how high they went, and touchdowns out of place.
 
     At the start of an episode every foot may land once, and is taken for high enough.
     """
@@ -18,7 +18,6 @@ class Swings:
         self._height: Float[np.ndarray, "N 4"] = np.empty((n, 4))
         self._touches: Bool[np.ndarray, "N 4"] = np.empty((n, 4), dtype=bool)
         self._may_land: Bool[np.ndarray, "N 4"] = np.empty((n, 4), dtype=bool)
-        self._fall: Float[np.ndarray, "N 4"] = np.empty((n, 4))
         self.restart(np.arange(n))
 
     def restart(self, ids: Int[np.ndarray, " K"]) -> None:
@@ -26,17 +25,15 @@ class Swings:
         self._height[ids] = np.inf
         self._touches[ids] = False
         self._may_land[ids] = True
-        self._fall[ids] = 0.0
 
     def see(
         self, left: Int[np.ndarray, " N"], step: Step, motion: Motion, factor: float = 1.0
-    ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-        """Touchdowns out of place, share of the swing height reached, and the impacts.
+    ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+        """Number of touchdowns out of place, and share of the swing height that was reached.
 
         In place is one touchdown after the machine has lifted the foot, in a state that has it in
         its stance or in the state before. The share is that of the edge taken, 1 where there is
-        none. The impacts are Σ v² of the feet that came down [m²/s²], each with the downward speed
-        that it had a step before.
+        none.
 
         Args:
             left: state in which the machine was.
@@ -45,13 +42,12 @@ class Swings:
             factor: on the machine's swing heights.
         """
         lands = motion.contact & ~self._touches
-        impact = (lands * np.square(np.minimum(self._fall, 0.0))).sum(axis=1)
-        self._fall = motion.foot_velocity_w[..., 2].copy()
         in_place = lands & self._may_land & self._machine.expected(left)
         height = np.fmax(self._height, motion.clearance)
         lifted = self._machine.lifted(left, step.state)
         self._touches = motion.contact.copy()
         self._may_land = (self._may_land & ~in_place) | lifted
         self._height = np.where(lifted, motion.clearance, height)
-        share = self._machine.swing_share(step.edge, height / factor)
-        return (lands & ~in_place).sum(axis=1), share, impact
+        return (lands & ~in_place).sum(axis=1), self._machine.swing_share(
+            step.edge, height / factor
+        )

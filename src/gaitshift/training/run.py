@@ -182,7 +182,6 @@ class Run:
             env.set_terrain(draw_grounds(stage, within, self.seed))
             env.push_at_most(stage.push)
         env.swing_factor = stage.swing_factor
-        env.landing_scale = stage.landing
         env.strictness = self.recipe.strictness(self.iteration)
         env.command_scale = self.recipe.command_scale(self.iteration)
         env.penalty_scale = self.recipe.penalty_scale(self.iteration)
