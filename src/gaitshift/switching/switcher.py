@@ -88,6 +88,8 @@ class Autonomous:
         return Decision(k=k, threshold=threshold, foot_height=height), fire
 
     def _shift(self, fire: Bool[np.ndarray, "N E"], motion: Motion, driver: Controller) -> None:
+        if not fire.any():
+            return
         edges = self.graph.edges
         free = np.ones(len(self._k), dtype=bool)
         for index in sorted(range(len(edges)), key=lambda i: -edges[i].priority):
