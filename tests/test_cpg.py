@@ -1,11 +1,14 @@
 """Oscillators against their couplings, kinematics against MuJoCo's, and the walk itself."""
 
+import json
+
 import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gaitshift.cli import main
 from gaitshift.cpg import GAITS, CpgController, HopfNetwork, joint_angles
 from gaitshift.cpg.kinematics import lift_torques
 from gaitshift.cpg.oscillators import phase_of
@@ -172,3 +175,15 @@ def test_loads_of_standing_legs_are_the_weight():
         mujoco.mj_jac(MODEL, data, jacobian, None, foot.xpos, body)
         expected += jacobian.T @ [0.0, 0.0, -75.0]
     np.testing.assert_allclose(torques, expected[6:], atol=1e-9)
+
+
+def test_the_demonstration_walks_on_oscillators(tmp_path, capsys):
+    track = ["--track", "flat@3,perlin:0.04@3", "--controller", "cpg", "--no-video", "--json"]
+    main(["demo", *track, "--out", str(tmp_path / "walk")])
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["survived"]
+    assert summary["distance_m"] > 3.0
+    with pytest.raises(SystemExit) as end:
+        main(["demo", *track, "--rough-gait", "gallop", "--out", str(tmp_path / "none")])
+    assert end.value.code == 2
+    assert "no oscillators for 'gallop'" in capsys.readouterr().err

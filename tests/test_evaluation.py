@@ -17,6 +17,7 @@ from gaitshift.evaluation import (
     rollout,
     run_demo,
 )
+from gaitshift.evaluation.evaluate import RUN_UP, grounds_of
 from gaitshift.log import Log
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.switching import Condition, Driver, Scheduled
@@ -155,6 +156,18 @@ def test_on_flat_ground_alone_no_gait_is_changed() -> None:
     assert all(summary["survived"] and not summary["switches"] for summary in summaries)
 
 
+@pytest.mark.parametrize("speed", [1.0, 1.2])
+def test_the_speed_loop_brings_the_mean_speed_to_what_is_asked(speed: float) -> None:
+    bound, off = policy.load("bound"), {}
+    for open_loop in (True, False):
+        config = EvaluationConfig(episodes=8, seconds=8, speed=speed, open_loop=open_loop)
+        figures, log = evaluate(bound, config)
+        assert (log.command[..., 0] == speed).all(), "a log keeps what is wanted, not what is asked"
+        off[open_loop] = abs(figures["speed_mean"] - speed)
+    assert off[False] < 0.02
+    assert off[False] < off[True]
+
+
 def test_a_schedule_is_kept_to_the_step() -> None:
     config = DemoConfig(gaits=("trot", "bound", "trot"), at=(1.0, 2.5), episodes=2)
     log, summaries = run_demo(config, {gait: policy.load(gait) for gait in config.used})
@@ -211,16 +224,12 @@ def test_a_damaged_or_foreign_log_is_named(tmp_path) -> None:
 
 
 def test_ground_that_every_seed_makes_alike_is_made_once() -> None:
-    from gaitshift.evaluation.evaluate import _grounds
-
     for terrain in ("flat", "slope:10", "stairs:0.05"):
-        assert len(_grounds(EvaluationConfig(terrain=terrain, seconds=2.0), 1.0)) == 1
+        assert len(grounds_of(terrain, seed=0, speed=1.0, seconds=2.0)) == 1
 
 
 def test_grounds_of_an_evaluation_reach_as_far_as_robots_can_walk() -> None:
-    from gaitshift.evaluation.evaluate import RUN_UP, _grounds
-
-    grounds = _grounds(EvaluationConfig(terrain="perlin:0.1", seconds=10.0), 1.2)
+    grounds = grounds_of("perlin:0.1", seed=0, speed=1.2, seconds=10.0)
     assert len(grounds) == 8
     assert all(g.extent[0] == -RUN_UP and g.extent[1] > 1.2 * 10.0 + 1.0 for g in grounds)
     assert len({g.height.tobytes() for g in grounds}) == 8
