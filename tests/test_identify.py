@@ -13,7 +13,7 @@ from gaitshift.identification import Recording, auc
 from gaitshift.identification.candidates import CANDIDATES
 from gaitshift.identification.classifier import RoughnessClassifier
 from gaitshift.identification.finding import judge, tune
-from gaitshift.identification.passages import passage_scores
+from gaitshift.identification.passage import passage_scores
 from gaitshift.identification.statistics import auc_interval
 from gaitshift.legs import LEGS
 from gaitshift.switching import Rule

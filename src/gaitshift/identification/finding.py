@@ -11,7 +11,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.identification.candidates import BETAS, Candidate
 from gaitshift.identification.choice import Choice, choose
 from gaitshift.identification.grid import first_firings
-from gaitshift.identification.passages import passage_scores
+from gaitshift.identification.passage import passage_scores
 from gaitshift.identification.recording import Recording
 from gaitshift.identification.scores import detections
 from gaitshift.identification.statistics import auc, auc_interval

@@ -9,7 +9,7 @@ import numpy as np
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.identification.finding import Judged, OnCourse
-from gaitshift.identification.passages import LENGTH
+from gaitshift.identification.passage import LENGTH
 from gaitshift.identification.statistics import poisson, wilson
 
 README, CONDITIONS, COURSES = "README.md", "conditions.csv", "courses.csv"
