@@ -60,7 +60,7 @@ def test_a_point_out_of_reach_is_reached_for_with_the_leg_straight():
 @pytest.mark.parametrize("name", GAITS)
 def test_phases_converge_to_those_of_the_coupling_from_any_start(name):
     network, rng = HopfNetwork(), np.random.default_rng(1)
-    offset = -np.tile(GAITS[name].phases, (50, 1))
+    offset = -np.tile(load(name).ideal_phase, (50, 1))
     state = network.start(50, rng.random((50, 4)))
     frequency = rng.uniform(1.0, 3.0, 50)
     for _ in range(400):
@@ -73,7 +73,7 @@ def test_phases_converge_to_those_of_the_coupling_from_any_start(name):
 
 def test_the_stride_frequency_is_the_commanded_one():
     network = HopfNetwork()
-    offset = -np.array([GAITS["trot"].phases])
+    offset = -np.array([load("trot").ideal_phase])
     state = network.start(1, offset)
     turned = 0.0
     for _ in range(1000):

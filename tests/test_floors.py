@@ -21,6 +21,7 @@ ON_A_ROBOT = (
     "switching",
     "switching.height_difference",
     "switching.graph",
+    "cpg",
 )
 """Modules that go onto a robot, where NumPy, onnxruntime and jaxtyping are all there is."""
 

@@ -92,7 +92,7 @@ def test_judging_replays_what_a_live_condition_does():
     (tuned,) = tune(height_candidates()[:1], ways, way="rough")
     (judged,) = judge([tuned], ways)
     recording = ways()[1]
-    values, rule = recording.values(tuned.candidate.statistic), tuned.rule
+    values, rule = tuned.candidate.values(recording), tuned.rule
     expected = []
     for robot in range(recording.robots):
         k = np.zeros(1)
@@ -287,3 +287,17 @@ def test_a_classifier_needs_both_labels(rough, says):
     one_kind = march("flat", noise=0.0)
     with pytest.raises(GaitshiftError, match=f"all labels are {says}"):
         RoughnessClassifier.fit([replace(one_kind, rough=np.full_like(one_kind.rough, rough))])
+
+
+def test_of_all_conditions_the_classifier_is_left_out_where_one_robot_is_all_there_is(
+    tmp_path, capsys
+):
+    log = table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1))
+    out = ["--out", str(tmp_path / "report"), "--json"]
+    main(["identify", str(log), "--condition", "all", *out])
+    said = capsys.readouterr()
+    assert "left out" in said.err
+    assert "classifier" not in {row["condition"] for row in json.loads(said.out)["conditions"]}
+    with pytest.raises(SystemExit) as end:
+        main(["identify", str(log), "--condition", "classifier", "--overwrite", *out])
+    assert end.value.code == 2

@@ -85,23 +85,20 @@ def jobs_of(settings: Iterable[Default], names: Iterable[str], seeds: Iterable[i
     ]
 
 
-def judged(jobs: list[Job], processes: int) -> dict[str, dict[str, Any]]:
+def judged(
+    jobs: list[Job], processes: int, config: EvaluationConfig = JUDGED
+) -> dict[str, dict[str, Any]]:
     """Trains what is missing; figures of each job's policy by the name of the job."""
     with progress(f"{len(jobs)} runs") as report:
         train_all(jobs, RUNS, processes, report)
-    return {job.name: evaluate(policy.load(RUNS / job.name / POLICY), JUDGED)[0] for job in jobs}
+    return {job.name: evaluate(policy.load(RUNS / job.name / POLICY), config)[0] for job in jobs}
 
 
 def write_seeds(processes: int) -> Path:
     """The table of fresh seeds."""
     jobs = jobs_of([setting()], FIRST_GAITS, FRESH_SEEDS)
     figures = judged(jobs, processes)
-    unaided = {
-        job.name: evaluate(policy.load(RUNS / job.name / POLICY), replace(JUDGED, open_loop=True))[
-            0
-        ]
-        for job in jobs
-    }
+    unaided = judged(jobs, processes, replace(JUDGED, open_loop=True))
     head = ("gait", "seed", "verdict", "survival", "speed [m/s]", "open loop [m/s]", "cycles [Hz]")
     head += ("pattern",)
     head += ("touchdowns a cycle", "least consistency", "least clearance [cm]", "CoT", "misses")

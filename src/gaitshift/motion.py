@@ -10,6 +10,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+GRAVITY = 9.81
+"""[m/s²]"""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:

@@ -15,7 +15,7 @@ from gaitshift.errors import GaitshiftError
 if TYPE_CHECKING:
     from gaitshift.identification.finding import Judged, Recordings
 
-REPORT, CONDITIONS, COURSES, ROC = "README.md", "conditions.csv", "courses.csv", "roc.png"
+ROC = "roc.png"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class Identify:
     """Find α and β of a shift condition from logs, and judge them on others.
 
     Logs are npz files of `gaitshift record`, `demo` and `evaluate`, or tables (CSV, Parquet) of any
-    robot with the columns time, rough, contact_LF, foot_LF_x and so on. Every condition is replayed
+    robot with the columns time, rough, contact_FL, foot_FL_x and so on. Every condition is replayed
     over a grid of α, β and leaks; the soonest detection that never shifts on smooth ground is
     chosen. Writes README.md, conditions.csv, courses.csv, a map a condition, and ROC curves.
     """
@@ -48,7 +48,7 @@ class Identify:
         """Tunes, judges, and writes the report."""
         try:
             from gaitshift.identification import report as reports
-            from gaitshift.identification.candidates import candidates
+            from gaitshift.identification.candidates import CANDIDATES, candidates
             from gaitshift.identification.classifier import NAME, RoughnessClassifier
             from gaitshift.identification.finding import judge, tune
             from gaitshift.identification.sources import check_sources
@@ -58,21 +58,25 @@ class Identify:
             ) from error
         if not self.logs:
             raise GaitshiftError("which logs? make some with: gaitshift record trot --out logs")
-        names = () if "all" in self.condition else self.condition
-        wanted = list(candidates(tuple(name for name in names if name != NAME)))
-        if names == (NAME,):
-            wanted = []
+        everything = "all" in self.condition
+        named = candidates([name for name in self.condition if name not in (NAME, "all")])
+        wanted = list(CANDIDATES if everything else named)
         check_sources((*self.logs, *self.held_out))
-        check_folder(self.out, overwrite=self.overwrite, ours=(REPORT, CONDITIONS, COURSES, ROC))
+        check_folder(self.out, overwrite=self.overwrite, ours=(*reports.FILES, ROC))
         read = _reader(self.logs)
         classifier: RoughnessClassifier | None = None
-        if not names or NAME in names:
+        if everything or NAME in self.condition:
             say("fitting the classifier")
-            classifier = RoughnessClassifier.fit(read())
-            wanted.append(classifier.candidate(crosswise=True))
+            try:
+                classifier = RoughnessClassifier.fit(read())
+                wanted.append(classifier.candidate(crosswise=True))
+            except GaitshiftError as error:
+                if not everything:
+                    raise
+                say(f"{error}; it is left out")
         tuned = tune(wanted, read, way=self.way, report=_tell("choosing"))
         missing = {c.name for c in wanted} - {t.candidate.name for t in tuned}
-        if names and missing:
+        if missing and not everything:
             raise GaitshiftError(f"the logs lack the signals of '{min(missing)}'")
         if classifier is not None:
             known = classifier.candidate(crosswise=False)

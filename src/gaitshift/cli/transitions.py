@@ -44,6 +44,7 @@ class Transitions:
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.studies import Pair, run_pair
+            from gaitshift.studies.transition_page import page
             from gaitshift.studies.transition_table import is_of, read_rows, row_of, write_rows
         except ImportError as error:
             raise GaitshiftError(
@@ -79,57 +80,22 @@ class Transitions:
                     )
                 rows.append(row_of(pair, ground, self.seed, outcomes))
                 write_rows(rows, path)
-        self._write(rows)
+        self._draw(rows)
+        command = shlex.join(["gaitshift", *sys.argv[1:]])
+        (self.out / README).write_text(page(rows, command))
         if self.json:
             emit_json({"out": str(self.out), "transitions": rows})
         else:
             emit_table(f"shifts, {self.switches} each; more in {self.out}", _table(rows))
 
-    def _write(self, rows: list[dict[str, Any]]) -> None:
-        """README.md and the maps of all that the table has."""
-        from gaitshift.plots.transitions import transition_map
+    def _draw(self, rows: list[dict[str, Any]]) -> None:
+        """A map a ground, of all that the table has."""
+        from gaitshift.plots.transitions import transition_map  # matplotlib is slow to import
+        from gaitshift.studies.transition_page import picture_of
 
-        parts = [
-            "# Shifts in an instant",
-            "Policy and machine are swapped at an instant drawn from a whole stride of the old "
-            "gait. A shift succeeds when the robot does not fall within 5 s and every stride from "
-            "some moment on shows the new gait for half of its steps or more; settle time: until "
-            "the first such stride is over. Dip: how far the mean speed of a stride falls below "
-            "the slower of the two commands. Intervals are Wilson's, of 95 %.",
-            f"Made by `{shlex.join(['gaitshift', *sys.argv[1:]])}`.",
-        ]
         for ground in dict.fromkeys(row["ground"] for row in rows):
             of = [row for row in rows if row["ground"] == ground]
-            picture = f"{ground.replace(':', '-')}.png"
-            transition_map(of, self.out / picture)
-            total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
-            lines = [
-                "| from | to | succeeded | interval | fell | settled, 95 % within [s] "
-                "| dip [m/s] | tilt, 95 % within [°] | worst phase |",
-                "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
-            ]
-            lines += [f"| {' | '.join(_readme_cells(row))} |" for row in of]
-            parts += [
-                f"## {ground}",
-                f"{good} of {total} shifts succeeded.",
-                f"![Failed shifts on {ground}]({picture})",
-                "\n".join(lines),
-            ]
-        (self.out / README).write_text("\n\n".join(parts) + "\n")
-
-
-def _readme_cells(row: dict[str, Any]) -> tuple[str, ...]:
-    return (
-        row["old"],
-        row["new"],
-        f"{row['successes']} of {row['switches']}",
-        f"{row['low']:.4f} to {row['high']:.4f}",
-        str(row["fell"]),
-        str(row["settle_s_p95"]),
-        f"{row['dip_m_s']:.2f}",
-        f"{row['tilt_deg_p95']:.0f}",
-        f"{row['worst_phase']}: {row['worst_phase_success']:.3f}",
-    )
+            transition_map(of, self.out / picture_of(ground))
 
 
 def _table(rows: list[dict[str, Any]]) -> list[tuple[str, ...]]:

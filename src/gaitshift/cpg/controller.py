@@ -15,11 +15,8 @@ from gaitshift.cpg.kinematics import FORE, SIDE, joint_angles, lift_torques
 from gaitshift.cpg.oscillators import HopfNetwork, phase_of
 from gaitshift.errors import GaitshiftError
 from gaitshift.gaits import load
-from gaitshift.motion import Motion
+from gaitshift.motion import GRAVITY, Motion
 from gaitshift.robot import ANYMAL_B, Robot
-
-GRAVITY = 9.81
-"""[m/s²]"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from gaitshift import gaits
-
 
 @dataclass(frozen=True, kw_only=True)
 class CpgGait:
@@ -25,11 +23,6 @@ class CpgGait:
     """How far to the side [m]."""
     sweep: float = 1.0
     """Feet sweep back faster than the command by this factor, where they lose as much by slip."""
-
-    @property
-    def phases(self) -> tuple[float, ...]:
-        """Touchdown of each leg [stride]."""
-        return tuple(gaits.load(self.name).ideal_phase)
 
 
 GAITS = {

@@ -19,7 +19,7 @@ class Course:
     name: str
     """In words that a file name may have."""
     terrain: str
-    """Its spec; robots start 2 m behind its beginning."""
+    """Its spec; robots start 2 m after its beginning."""
 
 
 def _smooth() -> tuple[Course, ...]:

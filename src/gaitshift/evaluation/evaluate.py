@@ -89,7 +89,7 @@ def run_policy(
         speed=config.speed,
         stride_frequency=config.stride_frequency,
         push=PushConfig(force=config.push),
-        speed_loop=None if config.open_loop else SpeedLoop(),
+        speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
     )
     driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
     speed = policy.info.forward_speed if config.speed is None else config.speed

@@ -25,8 +25,8 @@ class RolloutConfig:
     """Commanded stride frequency [Hz]; None: that of each robot's gait."""
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
     """Keeps robots on their line along x."""
-    speed_loop: SpeedLoop | None = field(default_factory=SpeedLoop)
-    """Keeps their mean speed; None: policies are asked for the commanded speed as it is."""
+    speed_loop: SpeedLoop = field(default_factory=SpeedLoop)
+    """Keeps their mean speed; `SpeedLoop(limit=0)` asks for the commanded speed as it is."""
     push: PushConfig = field(default_factory=PushConfig)
     """Disturbances."""
     joint_noise: float = 0.1
@@ -62,8 +62,7 @@ def rollout(
     recorder = _Recorder(world, driver)
     fallen = np.zeros(n, dtype=bool)
     wanted = command = _command(config, world.motion, driver, start_xy)
-    loop = config.speed_loop
-    speed_state = None if loop is None else loop.start(n)
+    speed_state = config.speed_loop.start(n)
     for step in range(config.steps):
         target = driver.act(world.motion, command)
         target[fallen] = stance
@@ -75,11 +74,10 @@ def rollout(
         if switcher is not None:
             decision = switcher.step((step + 1) * CONTROL_PERIOD, motion, driver)
         recorder.add(motion, wanted, decision, fallen)
-        wanted = command = _command(config, motion, driver, start_xy)
-        if loop is not None and speed_state is not None:
-            forward = motion.base_linear_velocity_b[:, 0]
-            speed_state, asked = loop.step(speed_state, wanted.forward_speed, forward)
-            command = replace(wanted, forward_speed=asked)
+        wanted = _command(config, motion, driver, start_xy)
+        forward = motion.base_linear_velocity_b[:, 0]
+        speed_state, asked = config.speed_loop.step(speed_state, wanted.forward_speed, forward)
+        command = replace(wanted, forward_speed=asked)
         if step % 25 == 24:
             report(step + 1, config.steps)
             if (fallen | (motion.base_position_w[:, 0] > finish_x)).all():

@@ -5,10 +5,8 @@ from jaxtyping import Float
 
 from gaitshift.gait_analysis.sample import Sample
 from gaitshift.log import Log
+from gaitshift.motion import GRAVITY
 from gaitshift.robot import ROBOTS
-
-GRAVITY = 9.81
-"""[m/s²]"""
 
 _SHORTEST_DRIFT = 0.5
 """Robots that fall sooner after the warm-up have no drift [s]."""

@@ -1,7 +1,8 @@
 """The conditions that are compared: a statistic each, with the α and leaks that are tried."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -34,35 +35,40 @@ class Candidate:
 
     name: str
     """As on the command line."""
-    statistic: AnyStatistic
-    """What it watches."""
+    values: Callable[[Recording], Float[np.ndarray, "T N M"]]
+    """What it watches on a recording."""
     low: float
-    """Smallest α that is tried, in the statistic's unit."""
+    """Smallest α that is tried, in `unit`."""
     high: float
     """Largest α that is tried; those between them lie evenly on a logarithmic scale."""
+    unit: str = ""
+    """Of α."""
+    needs: tuple[str, ...] = ()
+    """Optional signals that it looks at."""
     leaks: tuple[float, ...] = _LEAKS
     """Leaks that are tried [counts a step]."""
     note: str = ""
     """What it stands for, in a few words."""
-    values_of: Callable[[Recording], Float[np.ndarray, "T N M"]] | None = field(
-        default=None, compare=False
-    )
-    """Where the numbers come from otherwise than step by step: a classifier's."""
 
     @property
     def alphas(self) -> Float[np.ndarray, " A"]:
         """α that are tried."""
         return np.geomspace(self.low, self.high, _ALPHAS)
 
-    def values(self, recording: Recording) -> Float[np.ndarray, "T N M"]:
-        """Its numbers on a recording."""
-        if self.values_of is not None:
-            return self.values_of(recording)
-        return recording.values(self.statistic)
-
     def is_fed_by(self, recording: Recording) -> bool:
         """Whether the recording has all signals that it looks at."""
-        return all(getattr(recording, name) is not None for name in self.statistic.needs)
+        return all(getattr(recording, name) is not None for name in self.needs)
+
+
+def _watching(statistic: AnyStatistic, name: str, **settings: Any) -> Candidate:
+    """A candidate whose numbers are a statistic's, step by step."""
+    return Candidate(
+        name=name,
+        values=lambda recording: recording.values(statistic),
+        unit=statistic.unit,
+        needs=statistic.needs,
+        **settings,
+    )
 
 
 def _six(leaks: tuple[float, ...]) -> tuple[float, ...]:
@@ -71,76 +77,76 @@ def _six(leaks: tuple[float, ...]) -> tuple[float, ...]:
 
 
 CANDIDATES = (
-    Candidate(
-        name="paper",
-        statistic=HeightDifference(frame="body"),
+    _watching(
+        HeightDifference(frame="body"),
+        "paper",
         low=0.005,
         high=0.5,
         leaks=(0.0,),
         note="Algorithm 1 as printed: body frame, no leak",
     ),
-    Candidate(
-        name="height_difference",
-        statistic=HeightDifference(),
+    _watching(
+        HeightDifference(),
+        "height_difference",
         low=0.005,
         high=0.5,
         leaks=_six(_LEAKS),
         note="the same along the vertical, with a leak",
     ),
-    Candidate(
-        name="plane_residual",
-        statistic=PlaneResidual(),
+    _watching(
+        PlaneResidual(),
+        "plane_residual",
         low=0.002,
         high=0.2,
         note="two touches a foot about their plane",
     ),
-    Candidate(
-        name="touchdown_surprise",
-        statistic=TouchdownSurprise(),
+    _watching(
+        TouchdownSurprise(),
+        "touchdown_surprise",
         low=0.005,
         high=0.1,
         note="new touches against the plane of the earlier ones",
     ),
-    Candidate(
-        name="attitude_variance",
-        statistic=AttitudeVariance(),
+    _watching(
+        AttitudeVariance(),
+        "attitude_variance",
         low=0.003,
         high=0.3,
         note="deviation of roll and pitch",
     ),
-    Candidate(
-        name="contact_timing",
-        statistic=ContactTiming(),
+    _watching(
+        ContactTiming(),
+        "contact_timing",
         low=0.005,
         high=0.5,
         leaks=_six(_LEAKS),
         note="strides shorter or longer than asked for",
     ),
-    Candidate(
-        name="slip",
-        statistic=Slip(),
+    _watching(
+        Slip(),
+        "slip",
         low=0.02,
         high=2.0,
         leaks=_six(_LEAKS),
         note="speed of feet that ought to stand",
     ),
-    Candidate(
-        name="cost_of_transport",
-        statistic=CostOfTransport(),
+    _watching(
+        CostOfTransport(),
+        "cost_of_transport",
         low=0.1,
         high=10.0,
         note="power over weight and speed",
     ),
-    Candidate(
-        name="value_drop",
-        statistic=ValueDrop(),
+    _watching(
+        ValueDrop(),
+        "value_drop",
         low=0.01,
         high=100.0,
         note="the critic expects less than it did",
     ),
-    Candidate(
-        name="oracle",
-        statistic=Oracle(),
+    _watching(
+        Oracle(),
+        "oracle",
         low=0.4,
         high=0.6,
         leaks=(0.0,),
@@ -150,15 +156,15 @@ CANDIDATES = (
 """A new one is an entry here."""
 
 
-def candidates(names: tuple[str, ...]) -> tuple[Candidate, ...]:
-    """The candidates of these names; all if none.
+def candidates(names: Sequence[str]) -> tuple[Candidate, ...]:
+    """The candidates of these names.
 
     Raises:
         GaitshiftError: no such candidate.
     """
-    known = tuple(candidate.name for candidate in CANDIDATES)
+    known = {candidate.name: candidate for candidate in CANDIDATES}
     unknown = [name for name in names if name not in known]
     if unknown:
         listed = ", ".join((*known, "classifier"))
         raise GaitshiftError(f"no condition '{unknown[0]}'; known: {listed}, or all")
-    return tuple(c for c in CANDIDATES if not names or c.name in names)
+    return tuple(known[name] for name in names)

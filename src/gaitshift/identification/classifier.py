@@ -19,7 +19,6 @@ from gaitshift.switching import (
     ContactTiming,
     CostOfTransport,
     HeightDifference,
-    Oracle,
     PlaneResidual,
     Slip,
     TouchdownSurprise,
@@ -112,11 +111,10 @@ class RoughnessClassifier:
         """As a condition whose α is a probability."""
         return Candidate(
             name=NAME,
-            statistic=Oracle(),
             low=0.02,
             high=0.999,
             note="gradient boosting on all of these signals: an upper mark",
-            values_of=lambda recording: self.probability(recording, crosswise=crosswise),
+            values=lambda recording: self.probability(recording, crosswise=crosswise),
         )
 
 

@@ -1,9 +1,12 @@
 """Recordings cut into passages of one length: what ROC curves are made of."""
 
-import numpy as np
-from jaxtyping import Float
+from collections.abc import Iterator
+from itertools import pairwise
 
-from gaitshift.identification.grid import counts_at, steps_alive
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.identification.grid import counters, steps_alive
 from gaitshift.identification.recording import Recording
 from gaitshift.switching import Rule
 
@@ -25,17 +28,21 @@ def passage_scores(
     scores: dict[bool, list[int]] = {True: [], False: []}
     ends = steps_alive(recording.alive)
     for robot in range(recording.robots):
-        growth = rule.epsilon * counts_at(values[:, robot], rule, alphas).T - rule.leak
         rough, way = recording.rough[:, robot], recording.distance[:, robot]
-        start = 0
-        k = peak = np.zeros(len(alphas))
-        for t in range(int(ends[robot])):
-            is_over = way[t] - way[start] >= LENGTH
-            if is_over or rough[t] != rough[start]:
-                if is_over:
-                    scores[bool(rough[start])].append(int(np.count_nonzero(peak > rule.beta)))
-                start = t
-                k = peak = np.zeros(len(alphas))
-            k = np.maximum(k + growth[t], 0.0)
-            peak = np.maximum(peak, k)
+        for start, end in _cut(rough[: ends[robot]], way[: ends[robot]]):
+            k = counters(values[start:end, robot], rule, alphas)
+            scores[bool(rough[start])].append(int(np.count_nonzero(k.max(axis=1) > rule.beta)))
     return scores
+
+
+def _cut(rough: Bool[np.ndarray, " T"], way: Float[np.ndarray, " T"]) -> Iterator[tuple[int, int]]:
+    """First step of each passage of one robot, and the step after its last."""
+    changes = np.flatnonzero(rough[1:] != rough[:-1]) + 1
+    borders: list[int] = [0, *changes.tolist(), len(rough)]
+    for first, last in pairwise(borders):
+        start = first
+        while start < last:
+            end = start + int(np.count_nonzero(way[start:last] < way[start] + LENGTH))
+            if end < last:
+                yield start, end
+            start = end

@@ -12,7 +12,7 @@ from gaitshift.identification.finding import Judged, OnCourse
 from gaitshift.identification.passage import LENGTH
 from gaitshift.identification.statistics import poisson, wilson
 
-README, CONDITIONS, COURSES = "README.md", "conditions.csv", "courses.csv"
+README, CONDITIONS, COURSES = FILES = ("README.md", "conditions.csv", "courses.csv")
 
 Row = dict[str, Any]
 
@@ -69,7 +69,7 @@ def _condition_row(one: Judged) -> Row:
     return {
         "condition": tuned.candidate.name,
         "alpha": choice.alpha,
-        "unit": tuned.candidate.statistic.unit,
+        "unit": tuned.candidate.unit,
         "beta": choice.beta,
         "leak": choice.leak,
         "keeps_still": choice.is_free,

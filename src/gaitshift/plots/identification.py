@@ -52,7 +52,7 @@ def condition_map(tuned: Tuned, path: Path) -> Figure:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("β [counts]")
-        unit = tuned.candidate.statistic.unit
+        unit = tuned.candidate.unit
         axes.set_ylabel(f"α [{unit}]" if unit else "α")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(_plain))

@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float, Int
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.evaluation.evaluate import grounds_of, starts
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.gait_analysis.base import forward_speed
 from gaitshift.log import Log
-from gaitshift.motion import Motion
+from gaitshift.motion import Motion, rotation_of
 from gaitshift.policy import Policy
 from gaitshift.switching import Controller, Decision, Driver
 from gaitshift.world import World
@@ -135,12 +136,8 @@ def measure_shifts(log: Log, at: Int[np.ndarray, " N"], old: Policy, new: Policy
     fallen: np.ndarray = log.fallen[entries, robots]
     stride = round(1.0 / (new.info.stride_frequency * CONTROL_PERIOD))
     shown = running_mean(log.stance_shown[entries, robots].astype(float), stride)
-    qpos, qvel = log.qpos[entries, robots].astype(float), log.qvel[entries, robots].astype(float)
-    quaternion = qpos[..., 3:7]
-    w, x, y, z = np.moveaxis(quaternion, -1, 0)
-    upright = 1.0 - 2.0 * (x * x + y * y)
-    heading = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    forward = qvel[..., 0] * np.cos(heading) + qvel[..., 1] * np.sin(heading)
+    forward = forward_speed(log)[entries, robots].astype(float)
+    upright = rotation_of(log.qpos[entries, robots, 3:7].astype(float))[..., 2, 2]
     slower = min(old.info.forward_speed, new.info.forward_speed)
     return Outcomes(
         phase=_phase(log.contact[..., 0], at, old),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.switching.odometry import GRAVITY
+from gaitshift.motion import GRAVITY
 from gaitshift.switching.signals import Signals
 
 

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from gaitshift.motion import GRAVITY
 from gaitshift.switching.signals import Signals
-
-GRAVITY = 9.81
-"""[m/s²]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
