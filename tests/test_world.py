@@ -12,8 +12,9 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.legs import LEGS
 from gaitshift.motion import Motion
 from gaitshift.robot import ANYMAL_B
-from gaitshift.terrain import flat, perlin, slope
+from gaitshift.terrain import flat, perlin, slope, step
 from gaitshift.world import World
+from gaitshift.world.scene import build_model
 
 MASS = 30.4754
 """Of ANYmal B in its URDF [kg]."""
@@ -510,6 +511,21 @@ def test_placed_robots_rest_upright_with_the_lowest_foot_on_the_ground():
     np.testing.assert_array_equal(motion.joint_position, joints)
     np.testing.assert_array_equal(motion.joint_velocity, np.zeros((4, 12)))
     np.testing.assert_allclose(motion.gravity_b, np.tile([0, 0, -1], (4, 1)), atol=1e-15)
+
+
+def test_a_robot_that_lies_on_an_edge_has_memory_for_all_of_its_contacts():
+    edge = step(0.1, length=4.0, width=4.0).moved(-2.0, 0.0)
+    model = build_model(ANYMAL_B, ANYMAL_B.gains_of("default"), edge)
+    data, rng, most = mujoco.MjData(model), np.random.default_rng(0), 0
+    full = [mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL]
+    for _ in range(100):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:3] = rng.uniform((-0.3, 0.0, -0.05), (0.3, 0.0, 0.15))
+        data.qpos[3:] = rng.normal(0.0, 0.7, model.nq - 3)
+        mujoco.mj_forward(model, data)
+        most = max(most, data.ncon)
+        assert all(data.warning[int(kind)].number == 0 for kind in full)
+    assert most > 450, "431 were seen when memory ran out"
 
 
 def test_robots_share_several_terrains_out_in_turn():
