@@ -104,9 +104,9 @@ def test_a_thrown_robot_follows_the_parabola():
     """v·t - ½·g·t², less the ½·g·t·h of an integrator that moves by the new velocity."""
     world = robots(3, base_velocity_w=(0.4, -0.2, 3.0))
     start = world.motion.base_position_w
-    for step in range(1, 56):
+    for k in range(1, 56):
         motion = stand(world, 1)
-        t = step * PERIOD
+        t = k * PERIOD
         fall = GRAVITY * t * (t + PHYSICS_STEP) / 2
         path = start + np.array([0.4 * t, -0.2 * t, 3.0 * t - fall])
         np.testing.assert_allclose(motion.base_position_w, path, rtol=0, atol=1e-12)
