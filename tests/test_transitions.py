@@ -13,7 +13,8 @@ from gaitshift.command import CONTROL_PERIOD
 from gaitshift.evaluation import DemoConfig, run_demo
 from gaitshift.plots.transitions import transition_map
 from gaitshift.studies import Pair, run_pair
-from gaitshift.studies.transition_table import COLUMNS, read_rows
+from gaitshift.studies.table import read_rows
+from gaitshift.studies.transition_table import COLUMNS
 from gaitshift.studies.transitions import measure_shifts, running_mean
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
@@ -185,12 +186,12 @@ def test_the_map_shades_failures_and_counts_them(tmp_path):
 
 
 def test_read_rows_gives_what_was_written(tmp_path):
-    assert read_rows(tmp_path / "none.csv") == []
+    assert read_rows(tmp_path / "none.csv", COLUMNS, "shifts") == []
     path = tmp_path / "transitions.csv"
     with path.open("w", newline="") as file:
         lines = csv.writer(file)
         lines.writerow(COLUMNS)
         lines.writerow(["a", "b", "flat", 0, 8, 0, 0.0, 0.3, 8, "", "", 0.4, 80.0, "0 to 0.1", 0.0])
-    (row,) = read_rows(path)
+    (row,) = read_rows(path, COLUMNS, "shifts")
     assert row["switches"] == 8
     assert row["settle_s"] == ""

@@ -15,6 +15,7 @@ from gaitshift.cli.identify import Identify
 from gaitshift.cli.output import say
 from gaitshift.cli.record import Record
 from gaitshift.cli.reproduce import Reproduce
+from gaitshift.cli.study import Study
 from gaitshift.cli.train import Train
 from gaitshift.cli.transitions import Transitions
 from gaitshift.errors import GaitshiftError
@@ -27,6 +28,7 @@ Command = (
     | Annotated[Record, tyro.conf.subcommand("record")]
     | Annotated[Identify, tyro.conf.subcommand("identify")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Study, tyro.conf.subcommand("study")]
     | Annotated[Transitions, tyro.conf.subcommand("transitions")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )

@@ -44,8 +44,9 @@ class Transitions:
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.studies import Pair, run_pair
+            from gaitshift.studies.table import read_rows, write_rows
             from gaitshift.studies.transition_page import page
-            from gaitshift.studies.transition_table import is_of, read_rows, row_of, write_rows
+            from gaitshift.studies.transition_table import COLUMNS, is_of, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
@@ -61,7 +62,7 @@ class Transitions:
         path = self.out / TABLE
         if not path.is_file():
             check_folder(self.out, overwrite=self.overwrite, ours=(TABLE, README))
-        rows = [] if self.overwrite else read_rows(path)
+        rows = [] if self.overwrite else read_rows(path, COLUMNS, "shifts")
         self.out.mkdir(parents=True, exist_ok=True)
         for ground in self.grounds:
             for old, new in permutations(names, 2):
@@ -79,7 +80,7 @@ class Transitions:
                         report=report,
                     )
                 rows.append(row_of(pair, ground, self.seed, outcomes))
-                write_rows(rows, path)
+                write_rows(path, COLUMNS, rows)
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         (self.out / README).write_text(page(rows, command))

@@ -5,6 +5,7 @@ from gaitshift.identification.choice import choose as choose
 from gaitshift.identification.grid import counters as counters
 from gaitshift.identification.grid import counts_at as counts_at
 from gaitshift.identification.grid import first_firings as first_firings
+from gaitshift.identification.labels import is_rough as is_rough
 from gaitshift.identification.labels import rough_ground as rough_ground
 from gaitshift.identification.recording import Recording as Recording
 from gaitshift.identification.scores import Detections as Detections

@@ -1,7 +1,7 @@
 """Where the ground is rough: the truth that conditions are judged by."""
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.log import Log
@@ -20,11 +20,20 @@ def rough_ground(log: Log) -> Bool[np.ndarray, "T N"]:
     Raises:
         GaitshiftError: the name of the ground cannot be read.
     """
-    x = log.qpos[..., 0]
+    x0, length = float(log.terrain_origin[0]), float(log.terrain_size[0])
+    return is_rough(log.qpos[..., 0], log.terrain, x0, length)
+
+
+def is_rough(
+    x: Float[np.ndarray, "*shape"], terrain: str, x0: float, length: float
+) -> Bool[np.ndarray, "*shape"]:
+    """Whether the ground is rough at x [m]: a ground of this name from `x0`, `length` metres long.
+
+    Raises:
+        GaitshiftError: the name cannot be read.
+    """
     rough = np.zeros(x.shape, dtype=bool)
-    for section in sections_of(
-        log.terrain, float(log.terrain_origin[0]), float(log.terrain_size[0])
-    ):
+    for section in sections_of(terrain, x0, length):
         kind, _, number = section.name.partition(":")
         if kind not in ROUGH:
             continue

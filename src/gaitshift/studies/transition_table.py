@@ -1,38 +1,31 @@
-"""The table of shifts: a row a pair and ground, kept as it grows."""
-
-import csv
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+"""The table of shifts: a row a pair and ground."""
 
 import numpy as np
 
-from gaitshift.errors import GaitshiftError
 from gaitshift.identification import wilson
+from gaitshift.studies.table import Row
 from gaitshift.studies.transitions import Outcomes, Pair
-
-Row = dict[str, Any]
 
 PHASES = 10
 """Parts that the stride is cut into."""
 
-COLUMNS: tuple[str, ...] = (
-    "old",
-    "new",
-    "ground",
-    "seed",
-    "switches",
-    "successes",
-    "low",
-    "high",
-    "fell",
-    "settle_s",
-    "settle_s_p95",
-    "dip_m_s",
-    "tilt_deg_p95",
-    "worst_phase",
-    "worst_phase_success",
-)
+COLUMNS: dict[str, type] = {
+    "old": str,
+    "new": str,
+    "ground": str,
+    "seed": int,
+    "switches": int,
+    "successes": int,
+    "low": float,
+    "high": float,
+    "fell": int,
+    "settle_s": float,
+    "settle_s_p95": float,
+    "dip_m_s": float,
+    "tilt_deg_p95": float,
+    "worst_phase": str,
+    "worst_phase_success": float,
+}
 """Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
 
 
@@ -64,43 +57,6 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
         "worst_phase": f"{worst / PHASES:g} to {(worst + 1) / PHASES:g}",
         "worst_phase_success": round(shares[worst], 4),
     }
-
-
-def read_rows(path: Path) -> list[Row]:
-    """The rows of an earlier, perhaps unfinished, table; none where there is no file.
-
-    Raises:
-        GaitshiftError: it is no such table.
-    """
-    if not path.is_file():
-        return []
-    with path.open(newline="") as file:
-        reader = csv.DictReader(file)
-        rows = list(reader)
-    if tuple(reader.fieldnames or ()) != COLUMNS or any(None in row.values() for row in rows):
-        raise GaitshiftError(f"{path} is no table of shifts; give another --out, or --overwrite")
-    whole = ("seed", "switches", "successes", "fell")
-    real = ("low", "high", "settle_s", "settle_s_p95", "dip_m_s", "tilt_deg_p95")
-    real += ("worst_phase_success",)
-    try:
-        return [
-            row
-            | {name: int(row[name]) for name in whole}
-            | {name: float(row[name]) if row[name] else "" for name in real}
-            for row in rows
-        ]
-    except ValueError as error:
-        raise GaitshiftError(f"{path}: {error}") from error
-
-
-def write_rows(rows: Sequence[Row], path: Path) -> None:
-    """Writes the table, whole or not at all."""
-    part = path.with_suffix(".part")
-    with part.open("w", newline="") as file:
-        lines = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        lines.writeheader()
-        lines.writerows(rows)
-    part.replace(path)
 
 
 def is_of(row: Row, pair: Pair, ground: str, seed: int, switches: int) -> bool:

@@ -1,5 +1,6 @@
 """Who changes the gaits: conditions on a graph, or a schedule."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -45,9 +46,15 @@ class Autonomous:
     Of the edges that leave a robot's gait each counts on its own; the first to fire is taken.
     """
 
-    def __init__(self, graph: GaitGraph, n: int) -> None:
-        """All n robots stand in the graph's first gait, nothing counted yet."""
+    def __init__(
+        self, graph: GaitGraph, n: int, *, sees: Callable[[Motion], np.ndarray] | None = None
+    ) -> None:
+        """All n robots stand in the graph's first gait, nothing counted yet.
+
+        `sees` tells which robots are on rough ground, for a graph with an oracle.
+        """
         self.graph = graph
+        self._sees = sees
         self._statistics: dict[str, AnyStatistic] = {**graph.statistics}
         heights = [k for k, s in self._statistics.items() if isinstance(s, HeightDifference)]
         self._heights = heights[0] if heights else "h, for logs"
@@ -58,7 +65,8 @@ class Autonomous:
 
     def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Lets the edges count; where one fires, the robot changes to the gait it leads to."""
-        signals = Signals.from_motion(motion, time=time, command=driver.command)
+        rough = None if self._sees is None else self._sees(motion)
+        signals = Signals.from_motion(motion, time=time, command=driver.command, rough=rough)
         values: dict[str, np.ndarray] = {}
         for name, statistic in self._statistics.items():
             self._memory[name], values[name] = statistic.step(self._memory[name], signals)
