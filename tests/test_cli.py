@@ -180,17 +180,20 @@ def test_ctrl_c_leaves_a_run_that_goes_on(tmp_path: Path) -> None:
         "--out",
         str(out),
     ]
-    process = subprocess.Popen(
-        [*command, "--iterations", "40"], stderr=subprocess.PIPE, env=os.environ, text=True
-    )
     progress = out / "progress.csv"
     deadline = time.monotonic() + 120
-    while not (progress.exists() and len(progress.read_text().splitlines()) > 27):
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
+    with subprocess.Popen(
+        [*command, "--iterations", "40"], stderr=subprocess.PIPE, env=os.environ, text=True
+    ) as process:
+        try:
+            while not (progress.exists() and len(progress.read_text().splitlines()) > 27):
+                assert process.poll() is None, process.stderr.read()
+                assert time.monotonic() < deadline
+                time.sleep(0.02)
+            process.send_signal(signal.SIGINT)
+            said = process.communicate(timeout=60)[1]
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert "Traceback" not in said
     assert f"--resume {out}" in said
