@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from gaitshift import policy as policies
-from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
+from gaitshift.cli.growing import README, check_numbers, kept_rows
+from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.switching import CONDITIONS
 
-TABLE, README = "crossings.csv", "README.md"
+TABLE = "crossings.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,25 +48,19 @@ class Study:
         try:
             from gaitshift.studies.crossing import cross, ways
             from gaitshift.studies.crossing_table import COLUMNS, PICTURE, is_of, page, row_of
-            from gaitshift.studies.table import read_rows, write_rows
+            from gaitshift.studies.table import write_rows
         except ImportError as error:
             raise GaitshiftError(
                 f"study needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        if not 2 <= self.runs <= 1_000_000:
-            raise GaitshiftError(f"{self.runs} runs: 2 to 1000000 would be right")
-        if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+        check_numbers("runs", self.runs, self.seed, least=2)
         for amplitude in self.amplitudes:
             if not 0 <= amplitude <= 1:
                 raise GaitshiftError(f"an amplitude of {amplitude:g} m: 0 to 1 m would be right")
         every = ways(self.flat_gait, self.rough_gait, self.conditions)
         loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
         path = self.out / TABLE
-        if not path.is_file():
-            check_folder(self.out, overwrite=self.overwrite, ours=(TABLE, README))
-        rows = [] if self.overwrite else read_rows(path, COLUMNS, "crossings")
-        self.out.mkdir(parents=True, exist_ok=True)
+        rows = kept_rows(path, COLUMNS, "crossings", overwrite=self.overwrite)
         for amplitude in self.amplitudes:
             for way in every:
                 if any(is_of(row, way, amplitude, self.seed, self.runs) for row in rows):

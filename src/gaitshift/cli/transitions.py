@@ -10,10 +10,11 @@ from typing import Annotated, Any
 import tyro
 
 from gaitshift import policy as policies
-from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
+from gaitshift.cli.growing import README, check_numbers, kept_rows
+from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 
-TABLE, README = "transitions.csv", "README.md"
+TABLE = "transitions.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +45,7 @@ class Transitions:
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.studies import Pair, run_pair
-            from gaitshift.studies.table import read_rows, write_rows
+            from gaitshift.studies.table import write_rows
             from gaitshift.studies.transition_page import page
             from gaitshift.studies.transition_table import COLUMNS, is_of, row_of
         except ImportError as error:
@@ -54,16 +55,10 @@ class Transitions:
         names = policies.shipped() if self.gaits == ("all",) else self.gaits
         if len(set(names)) < 2:
             raise GaitshiftError("a shift needs two gaits or more")
-        if not 1 <= self.switches <= 1_000_000:
-            raise GaitshiftError(f"{self.switches} switches: 1 to 1000000 would be right")
-        if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+        check_numbers("switches", self.switches, self.seed)
         loaded = {name: policies.load(name) for name in names}
         path = self.out / TABLE
-        if not path.is_file():
-            check_folder(self.out, overwrite=self.overwrite, ours=(TABLE, README))
-        rows = [] if self.overwrite else read_rows(path, COLUMNS, "shifts")
-        self.out.mkdir(parents=True, exist_ok=True)
+        rows = kept_rows(path, COLUMNS, "shifts", overwrite=self.overwrite)
         for ground in self.grounds:
             for old, new in permutations(names, 2):
                 pair = Pair(old, new)

@@ -1,13 +1,12 @@
 """Does the shift help? Robots cross noise in one gait, in the other, or shifted by a condition."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.evaluate import grounds_of, starts
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.gait_analysis import robot_mass
@@ -15,6 +14,7 @@ from gaitshift.identification import is_rough
 from gaitshift.log import Log
 from gaitshift.motion import GRAVITY, Motion
 from gaitshift.policy import Policy
+from gaitshift.studies.batches import in_batches
 from gaitshift.switching import Autonomous, Condition, Driver, GaitGraph, Oracle, load_condition
 from gaitshift.world import World
 
@@ -47,9 +47,7 @@ class Way:
 
 def ways(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Way, ...]:
     """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
-    seen = Condition(
-        statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0, hold=0.0
-    )
+    seen = Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0)
     by = {name: load_condition(name) for name in conditions} | {"oracle": seen}
     return (
         Way(f"{flat} only", flat),
@@ -78,12 +76,6 @@ class Crossings:
     shifts: Int[np.ndarray, " N"]
     """Changes of gait until then."""
 
-    @classmethod
-    def together(cls, parts: "list[Crossings]") -> "Crossings":
-        """All of several."""
-        names = [field.name for field in fields(cls)]
-        return cls(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
-
 
 def cross(
     policies: Mapping[str, Policy],
@@ -95,14 +87,13 @@ def cross(
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Crossings:
     """Sends robots over noise of an amplitude [m], the same fields and starts for every way."""
-    if not 0 <= amplitude <= 1:
-        raise GaitshiftError(f"an amplitude of {amplitude:g} m: 0 to 1 m would be right")
-    parts: list[Crossings] = []
-    for index, first in enumerate(range(0, runs, BATCH)):
-        n = min(BATCH, runs - first)
-        parts.append(_batch(policies, way, amplitude, n, seed=1000 * seed + index))
-        report(first + n, runs)
-    return Crossings.together(parts)
+    return in_batches(
+        lambda n, seed: _batch(policies, way, amplitude, n, seed=seed),
+        runs,
+        most=BATCH,
+        seed=seed,
+        report=report,
+    )
 
 
 def _batch(

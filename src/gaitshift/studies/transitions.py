@@ -1,7 +1,7 @@
 """One gait swapped for another in an instant, at every phase of the stride: what comes of it."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
@@ -14,6 +14,7 @@ from gaitshift.gait_analysis.base import forward_speed
 from gaitshift.log import Log
 from gaitshift.motion import Motion, rotation_of
 from gaitshift.policy import Policy
+from gaitshift.studies.batches import in_batches
 from gaitshift.switching import Controller, Decision, Driver
 from gaitshift.world import World
 
@@ -62,12 +63,6 @@ class Outcomes:
         """No fall, and the new gait reached."""
         return ~self.fell & ~np.isnan(self.settle)
 
-    @classmethod
-    def together(cls, parts: "list[Outcomes]") -> "Outcomes":
-        """All of several."""
-        names = [field.name for field in fields(cls)]
-        return cls(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
-
 
 def run_pair(
     policies: Mapping[str, Policy],
@@ -79,13 +74,13 @@ def run_pair(
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Outcomes:
     """Shifts robots from one gait to the other, each at an instant of its own in the stride."""
-    parts: list[Outcomes] = []
-    for index, first in enumerate(range(0, switches, BATCH)):
-        n = min(BATCH, switches - first)
-        part = _run_batch(policies, pair, ground, n, seed=1000 * seed + index)
-        parts.append(part)
-        report(first + n, switches)
-    return Outcomes.together(parts)
+    return in_batches(
+        lambda n, seed: _run_batch(policies, pair, ground, n, seed=seed),
+        switches,
+        most=BATCH,
+        seed=seed,
+        report=report,
+    )
 
 
 @dataclass(frozen=True, eq=False)

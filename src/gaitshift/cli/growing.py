@@ -1,0 +1,31 @@
+"""Results that grow row by row: what the commands that make them share."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gaitshift.cli.output import check_folder
+from gaitshift.errors import GaitshiftError
+
+README = "README.md"
+
+
+def check_numbers(what: str, count: int, seed: int, *, least: int = 1) -> None:
+    """`GaitshiftError` unless there are so many, and the seed is one."""
+    if not least <= count <= 1_000_000:
+        raise GaitshiftError(f"{count} {what}: {least} to 1000000 would be right")
+    if seed < 0:
+        raise GaitshiftError(f"seed {seed}: a seed is 0 or larger")
+
+
+def kept_rows(
+    path: Path, columns: Mapping[str, type], what: str, *, overwrite: bool
+) -> list[dict[str, Any]]:
+    """The rows that an earlier call left in a folder, which is there from now on."""
+    from gaitshift.studies.table import read_rows
+
+    if not path.is_file():
+        check_folder(path.parent, overwrite=overwrite, ours=(path.name, README))
+    rows = [] if overwrite else read_rows(path, columns, what)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return rows
