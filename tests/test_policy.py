@@ -99,6 +99,42 @@ def test_the_exported_network_is_the_trained_one(tmp_path, robots, normalize):
     assert np.ptp(trained, axis=1).min() > 0.1, "the twelve actions differ"
 
 
+@pytest.mark.parametrize("normalize", [True, False])
+def test_the_exported_critic_is_the_trained_one_but_for_half_precision(tmp_path, normalize):
+    env, actor = untrained(1, normalize=normalize)
+    ppo = PpoConfig(hidden=(24, 10), normalize_observations=normalize)
+    recipe = Recipe(env=env.config, ppo=ppo, robots=2, steps=2)
+    critic = Learner(env, recipe).ppo.critic
+    size = env.observe.size
+    with torch.no_grad():
+        for parameter in critic.mlp.parameters():
+            parameter.normal_(0.0, 0.5)
+        if normalize:
+            critic.train()
+            critic.obs_normalizer.update(torch.randn(500, size) * 3.0 + 1.0)
+    critic.eval()
+    path = tmp_path / "policy.onnx"
+    export(actor, describe(env, {}), path, critic=critic)
+    observation = np.random.default_rng(0).normal(size=(9, size)).astype(np.float32)
+    with torch.no_grad():
+        trained = critic(as_tensors(observation)).numpy()[:, 0]
+        acted = actor(as_tensors(observation)).numpy()
+    loaded = policy.load(path)
+    assert loaded.has_critic
+    np.testing.assert_allclose(
+        loaded.value(observation), trained, atol=3e-3 * np.abs(trained).max()
+    )
+    assert np.ptp(trained) > 0.1, "the values differ"
+    np.testing.assert_allclose(loaded(observation), acted, rtol=1e-5, atol=1e-5)
+
+
+def test_a_policy_without_a_critic_says_so(made):
+    loaded = policy.load(made[2])
+    assert not loaded.has_critic
+    with pytest.raises(GaitshiftError, match="has no critic"):
+        loaded.value(np.zeros((1, loaded.observation.size), dtype=np.float32))
+
+
 def test_a_robot_gets_the_same_action_alone_as_among_others(made):
     loaded = policy.load(made[2])
     observation = np.random.default_rng(0).normal(size=(7, loaded.observation.size))

@@ -14,7 +14,16 @@ from gaitshift.motion import Motion
 from gaitshift.observation import Situation
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ANYMAL_B
-from gaitshift.switching import Autonomous, Condition, Driver, GaitGraph, Scheduled, Switcher
+from gaitshift.switching import (
+    Autonomous,
+    Condition,
+    Driver,
+    Edge,
+    GaitGraph,
+    Rule,
+    Scheduled,
+    Switcher,
+)
 from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
 from gaitshift.training.learner import Learner
@@ -26,21 +35,28 @@ FEET = ("FL", "FR", "BL", "BR")
 BASE_HEIGHT = 0.5
 
 
-def exported(folder, machine, *, seed=0, constant=None, gains="default", speed=None):
-    """An untrained policy of a machine; with `constant` its twelve actions are always those."""
+def exported(folder, machine, *, seed=0, constant=None, gains="default", speed=None, expected=None):
+    """An untrained policy of a machine; with `constant` its twelve actions are always those.
+
+    With `expected` it has a critic that always expects that.
+    """
     torch.manual_seed(seed)
     config = EnvConfig(gains=gains, forward_speed=speed)
     env = GaitEnv(machine, flat(10.0, 10.0), 1, config=config, threads=1)
     recipe = Recipe(env=config, ppo=PpoConfig(hidden=(16,)), robots=1, steps=1)
-    actor = Learner(env, recipe).ppo.actor
+    ppo = Learner(env, recipe).ppo
+    actor, critic = ppo.actor, None if expected is None else ppo.critic
     with torch.no_grad():
+        if critic is not None:
+            critic.mlp[-1].weight.zero_()
+            critic.mlp[-1].bias.fill_(expected)
         for parameter in actor.mlp.parameters():
             parameter.normal_(0.0, 0.1)
         if constant is not None:
             actor.mlp[-1].weight.zero_()
             actor.mlp[-1].bias.copy_(torch.tensor(constant))
     path = folder / f"{machine.name}-{seed}-{gains}-{constant is None}.onnx"
-    export(actor, describe(env, {}), path)
+    export(actor, describe(env, {}), path, critic=critic)
     return policy.load(path)
 
 
@@ -181,6 +197,66 @@ def test_a_batch_of_robots_is_driven_as_each_alone_would_be(policies):
             alone[robot].switch(np.array([0]), gait, motion.of(np.array([robot])))
         together += len(set(driver.gait.tolist())) == 3
     assert together > 5, "three gaits at a time"
+
+
+def test_what_is_expected_of_a_robot_is_what_the_critic_of_its_own_gait_expects(tmp_path, policies):
+    expecting = {
+        gait: exported(tmp_path, gaits.load(gait), expected=value)
+        for gait, value in (("trot", 3.0), ("bound", -4.0))
+    }
+    driver = Driver({**expecting, "pace": policies["pace"]}, 3, start="trot")
+    motion, command = motion_of(["FL BR"] * 3), Command.straight(3)
+    driver.switch(np.array([1]), "bound", motion)
+    driver.act(motion, command)
+    np.testing.assert_allclose(driver.value(), [3.0, -4.0, 3.0])
+    driver.switch(np.array([2]), "pace", motion)
+    np.testing.assert_allclose(driver.value(), [3.0, -4.0, 3.0], err_msg="of what was acted on")
+    driver.act(motion, command)
+    assert driver.value() is None, "the policy of pace has no critic"
+
+
+def test_a_condition_that_looks_at_the_critics_value_is_shown_it(tmp_path):
+    class Expectation:
+        """The critic's value as it is."""
+
+        unit, width, needs = "", 1, ("value",)
+
+        def start(self, n):
+            return None
+
+        def step(self, state, signals):
+            return None, signals.need("value", "expectation")[:, None]
+
+    expecting = {
+        gait: exported(tmp_path, gaits.load(gait), expected=value)
+        for gait, value in (("trot", 3.0), ("bound", 0.5))
+    }
+    graph = GaitGraph(
+        start="trot",
+        statistics={"expectation": Expectation()},
+        edges=(
+            Edge(
+                source="trot",
+                target="bound",
+                statistic="expectation",
+                rule=Rule(alpha=2.0, beta=2.0),
+            ),
+            Edge(
+                source="bound",
+                target="trot",
+                statistic="expectation",
+                rule=Rule(when="below", alpha=1.0, beta=1.0),
+            ),
+        ),
+    )
+    driver, switcher = Driver(expecting, 1, start="trot"), Autonomous(graph, 1)
+    seen = []
+    for step, motion in enumerate(staggering(1, 7)):
+        driver.act(motion, Command.straight(1))
+        driver.see(motion, Command.straight(1))
+        switcher.step(step / 100, motion, driver)
+        seen.append(gaits_of(driver)[0])
+    assert seen == ["trot", "trot", "bound", "bound", "trot", "trot", "trot"]
 
 
 def test_a_switch_from_a_gait_to_itself_changes_no_bit(policies):

@@ -40,6 +40,7 @@ TINY = Recipe(
             push=100.0,
             swing_factor=1.5,
             kl_factor=3.0,
+            horizon_factor=2.0,
         ),
     ),
     robots=4,
@@ -351,6 +352,7 @@ def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
     assert run.learner.ppo.entropy_coef == settled * run.recipe.ppo.entropy
     factor = settled * run.recipe.stages[-1].kl_factor
     assert run.learner.ppo.desired_kl == factor * run.recipe.ppo.desired_kl != 0.0
+    assert run.learner.ppo.gamma == pytest.approx(0.995), "1 / (1 - 0.99) steps, twice"
 
 
 def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(whole):

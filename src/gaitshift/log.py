@@ -65,17 +65,21 @@ class Log:
     """Length along x and width along y of the ground [m]."""
     terrain_origin: Float[np.ndarray, " 2"]
     """World x, y of its first sample [m]."""
+    value: Float[np.ndarray, "T N"] | None = None
+    """What the policy's critic expected from what robots acted on; None where nobody asked."""
 
     def part(self, entries: slice) -> "Log":
         """The same robots in some of the entries; arrays are shared."""
         courses = (f.name for f in fields(self) if not f.name.startswith(_TIMELESS))
-        return replace(self, **{name: getattr(self, name)[entries] for name in courses})
+        given = ((name, getattr(self, name)) for name in courses)
+        return replace(self, **{name: rows[entries] for name, rows in given if rows is not None})
 
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""
         part = path.with_suffix(".part.npz")
-        arrays: dict[str, Any] = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
-        np.savez_compressed(part, **arrays)
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        given: dict[str, Any] = {k: np.asarray(v) for k, v in values.items() if v is not None}
+        np.savez_compressed(part, **given)
         part.replace(path)
 
     @classmethod
@@ -92,7 +96,7 @@ class Log:
             raise GaitshiftError(f"no log file {path}") from error
         except (OSError, ValueError, zipfile.BadZipFile) as error:
             raise GaitshiftError(f"{path} is not a whole npz file: {error}") from error
-        missing = [f.name for f in fields(cls) if f.name not in values]
+        missing = [f.name for f in fields(cls) if f.name not in values and f.name != "value"]
         if missing:
             raise GaitshiftError(f"{path} is no log of gaitshift: it lacks '{missing[0]}'")
         for name in ("robot", "terrain"):

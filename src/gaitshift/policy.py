@@ -21,6 +21,9 @@ FORMAT_VERSION = 2
 
 _SHIPPED = Path(__file__).parent / "policies"
 
+_ONLY_WHAT_IS_ASKED: Any = cast(Any, onnxruntime).RunOptions()
+_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True  # the critic rests while the actor acts
+
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyInfo:
@@ -87,8 +90,26 @@ class Policy:
 
     def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
         """The deterministic actions for N observations."""
-        outputs = cast(Any, self.session).run(None, {"observation": observation})
-        return outputs[0]
+        return self._run("action", observation)
+
+    @cached_property
+    def has_critic(self) -> bool:
+        """Whether the file has the critic that the policy was trained with."""
+        return "value" in {output.name for output in cast(Any, self.session).get_outputs()}
+
+    def value(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, " N"]:
+        """What the critic expects from N observations on: scaled rewards to come, discounted.
+
+        Raises:
+            GaitshiftError: the file has no critic.
+        """
+        if not self.has_critic:
+            raise GaitshiftError(f"{self.path} has no critic; export it anew from its run")
+        return self._run("value", observation)[:, 0]
+
+    def _run(self, output: str, observation: np.ndarray) -> np.ndarray:
+        options = _ONLY_WHAT_IS_ASKED
+        return cast(Any, self.session).run([output], {"observation": observation}, options)[0]
 
     def target(self, action: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "N 12"]:
         """Joint targets [rad] of an action."""

@@ -112,6 +112,9 @@ class CpgController:
         torque = gains.kd * rate / CONTROL_PERIOD + lift_torques(angles, self._loads(phase))
         return angles + torque / gains.kp
 
+    def value(self) -> None:
+        """Oscillators expect nothing."""
+
     def own_command(self) -> Command:
         """Straight ahead, each robot at the speed and frequency that its gait is at home at."""
         speed = np.array([gait.speed for gait in self._of])

@@ -73,4 +73,4 @@ def run_course(
 ) -> Log:
     """Robots in one gait on a course, on eight grounds of a seed where the ground is random."""
     config = EvaluationConfig(terrain=course.terrain, episodes=robots, seconds=seconds, seed=seed)
-    return run_policy(policy, config, report=report)
+    return run_policy(policy, config, values=True, report=report)

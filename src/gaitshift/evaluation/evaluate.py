@@ -80,9 +80,13 @@ def run_policy(
     config: EvaluationConfig,
     *,
     finish_x: float = np.inf,
+    values: bool = False,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
-    """Runs the deterministic policy; ends early when nobody is on the way to `finish_x` [m]."""
+    """Runs the deterministic policy; ends early when nobody is on the way to `finish_x` [m].
+
+    With `values` the log keeps what the policy's critic expects.
+    """
     rng = np.random.default_rng(config.seed)
     run = RolloutConfig(
         seconds=config.seconds,
@@ -90,6 +94,7 @@ def run_policy(
         stride_frequency=config.stride_frequency,
         push=PushConfig(force=config.push),
         speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
+        values=values,
     )
     driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
     speed = policy.info.forward_speed if config.speed is None else config.speed

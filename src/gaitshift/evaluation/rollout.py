@@ -31,6 +31,8 @@ class RolloutConfig:
     """Disturbances."""
     joint_noise: float = 0.1
     """Joints start within ± this of the stance [rad]."""
+    values: bool = False
+    """Whether the log keeps what the policies' critics expect."""
 
     @property
     def steps(self) -> int:
@@ -59,7 +61,7 @@ def rollout(
     stance = driver.robot.stance_angles
     world.place(np.arange(n), xy=start_xy, yaw=np.zeros(n), joint_position=stance + noise)
     pusher = Pusher(config.push, n, rng)
-    recorder = _Recorder(world, driver)
+    recorder = _Recorder(world, driver, values=config.values)
     fallen = np.zeros(n, dtype=bool)
     wanted = command = _command(config, world.motion, driver, start_xy)
     speed_state = config.speed_loop.start(n)
@@ -106,6 +108,7 @@ _KEPT_AS = {
     "foot_position_w": np.float32,
     "clearance": np.float32,
     "foot_height": np.float32,
+    "value": np.float32,
     "gait": np.int16,
     "machine_state": np.int16,
 }
@@ -115,9 +118,10 @@ _KEPT_AS = {
 class _Recorder:
     """Collects what a `Log` is made of."""
 
-    def __init__(self, world: World, driver: Controller) -> None:
+    def __init__(self, world: World, driver: Controller, *, values: bool) -> None:
         self._world = world
         self._driver = driver
+        self._values = values
         self._columns: dict[str, list[np.ndarray]] = {}
 
     def add(
@@ -148,6 +152,8 @@ class _Recorder:
                 [command.forward_speed, command.yaw_rate, command.stride_frequency], axis=1
             ),
         }
+        if self._values and (expected := driver.value()) is not None:
+            row["value"] = expected
         for name, value in row.items():
             kept = value.astype(_KEPT_AS[name]) if name in _KEPT_AS else value
             self._columns.setdefault(name, []).append(kept)

@@ -114,4 +114,5 @@ class Recording:
             power=np.abs(log.torque * qvel[..., 6:]).sum(axis=2),
             speed_command=log.command[..., 0],
             stride=1.0 / log.command[..., 2],
+            value=None if log.value is None else log.value.astype(np.float64),
         )

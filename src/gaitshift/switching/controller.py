@@ -47,6 +47,10 @@ class Controller(Protocol):
         """Robots `ids` take up another gait at once."""
         ...
 
+    def value(self) -> Float[np.ndarray, " N"] | None:
+        """What its critic expected from what robots acted on last; None where there is none."""
+        ...
+
     def own_command(self) -> Command:
         """Straight ahead, at the speed and stride frequency each robot's gait is at home at."""
         ...

@@ -32,6 +32,7 @@ class Driver:
         self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
+        self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []
         self.command: Command | None = None
         """The command that robots acted on in the step seen last."""
         self.machine_state[:] = self._machines[self.gaits.index(start)].initial
@@ -78,6 +79,7 @@ class Driver:
         target = np.empty((self.n, 12))
         if self._touch_height is None:
             self._touch_height = last_touch(motion)
+        self._acted_on = []
         for index, ids in self._groups():
             policy = self.policies[self.gaits[index]]
             whole = len(ids) == self.n
@@ -90,11 +92,22 @@ class Driver:
                 stance=policy.robot.stance_angles,
                 touch_height=self._touch_height[ids],
             )
-            action = policy(policy.observation(situation)).astype(np.float64)
+            observation = policy.observation(situation)
+            self._acted_on.append((policy, ids, observation))
+            action = policy(observation).astype(np.float64)
             action = np.clip(action, -ACTION_LIMIT, ACTION_LIMIT)
             self._last_action[ids] = action
             target[ids] = policy.target(action)
         return target
+
+    def value(self) -> Float[np.ndarray, " N"] | None:
+        """What the policies' critics expected from what robots acted on last; None without them."""
+        value = np.full(self.n, np.nan)
+        for policy, ids, observation in self._acted_on:
+            if not policy.has_critic:
+                return None
+            value[ids] = policy.value(observation)
+        return value
 
     def own_command(self) -> Command:
         """Straight ahead, each robot at the speed and stride frequency its gait is at home at."""

@@ -59,6 +59,7 @@ class Autonomous:
         heights = [k for k, s in self._statistics.items() if isinstance(s, HeightDifference)]
         self._heights = heights[0] if heights else "h, for logs"
         self._statistics.setdefault(self._heights, HeightDifference())
+        self._asks_critic = any("value" in s.needs for s in self._statistics.values())
         self._memory: dict[str, Any] = {k: s.start(n) for k, s in self._statistics.items()}
         self._k = np.zeros((n, len(graph.edges)))
         self._time_in_gait = np.zeros(n)
@@ -66,7 +67,10 @@ class Autonomous:
     def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Lets the edges count; where one fires, the robot changes to the gait it leads to."""
         rough = None if self._sees is None else self._sees(motion)
-        signals = Signals.from_motion(motion, time=time, command=driver.command, rough=rough)
+        value = driver.value() if self._asks_critic else None
+        signals = Signals.from_motion(
+            motion, time=time, command=driver.command, value=value, rough=rough
+        )
         values: dict[str, np.ndarray] = {}
         for name, statistic in self._statistics.items():
             self._memory[name], values[name] = statistic.step(self._memory[name], signals)

@@ -55,10 +55,12 @@ class Learner:
             "learning_rate": self.ppo.learning_rate,
         }
 
-    def aim(self, *, desired_kl: float, entropy: float) -> None:
-        """Sets factors on the divergence that updates aim at, and on the entropy bonus."""
-        self.ppo.desired_kl = desired_kl * self.recipe.ppo.desired_kl
-        self.ppo.entropy_coef = entropy * self.recipe.ppo.entropy
+    def aim(self, *, desired_kl: float, entropy: float, horizon: float = 1.0) -> None:
+        """Sets factors on the divergence that updates aim at, the entropy bonus and the horizon."""
+        config = self.recipe.ppo
+        self.ppo.desired_kl = desired_kl * config.desired_kl
+        self.ppo.entropy_coef = entropy * config.entropy
+        self.ppo.gamma = 1.0 - (1.0 - config.discount) / horizon
 
     def _collect(self, statistics: "_Statistics") -> None:
         ppo, scale = self.ppo, self.recipe.ppo.reward_scale

@@ -156,7 +156,8 @@ class Run:
             "versions": _versions(),
         }
         info = describe(self.learner.env, training)
-        export(self.learner.ppo.actor, info, self.folder / POLICY, self._averaged())
+        ppo = self.learner.ppo
+        export(ppo.actor, info, self.folder / POLICY, self._averaged(), ppo.critic)
 
     def _averaged(self) -> torch.nn.Sequential:
         """The present actor's layers, their weights averaged with those of the last checkpoints."""
@@ -186,7 +187,9 @@ class Run:
         env.command_scale = self.recipe.command_scale(self.iteration)
         env.penalty_scale = self.recipe.penalty_scale(self.iteration)
         settling = self.recipe.settling(self.iteration)
-        self.learner.aim(desired_kl=stage.kl_factor * settling, entropy=settling)
+        self.learner.aim(
+            desired_kl=stage.kl_factor * settling, entropy=settling, horizon=stage.horizon_factor
+        )
         if self._is_checkpoint():
             self.learner.start_episodes(_seed_at(self.seed, self.iteration))
         seen = self.learner.iterate()
