@@ -12,7 +12,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.identification import Recording, auc
 from gaitshift.identification.candidates import CANDIDATES
 from gaitshift.identification.classifier import RoughnessClassifier
-from gaitshift.identification.finding import judge, tune
+from gaitshift.identification.finding import as_given, judge, tune
 from gaitshift.identification.passage import passage_scores
 from gaitshift.identification.statistics import auc_interval
 from gaitshift.legs import LEGS
@@ -103,6 +103,20 @@ def test_judging_replays_what_a_live_condition_does():
                 expected.append(recording.distance[t, robot] - recording.distance[entry, robot])
                 break
     assert sorted(judged.courses[1].delays_m) == pytest.approx(sorted(expected))
+
+
+def test_numbers_that_are_given_are_judged_as_those_that_are_chosen():
+    tuned = tune(height_candidates()[:1], ways, way="rough")
+    chosen = tuned[0].choice
+    numbers = {"alpha": chosen.alpha, "beta": chosen.beta, "leak": chosen.leak}
+    given = as_given(height_candidates()[:1], way="rough", **numbers)
+    by_choice, by_hand = (judge(those, ways)[0].courses for those in (tuned, given))
+    assert [c.delays_m for c in by_hand] == [c.delays_m for c in by_choice]
+    assert by_hand[1].tally.detected[0, 0] == 3
+    # No two of the feet differ by 20 cm where the noise is of 4 cm.
+    (far,) = judge(as_given(height_candidates()[:1], way="rough", alpha=0.2, beta=0.0), ways)
+    assert far.courses[1].tally.came[0, 0] == 3
+    assert far.courses[1].tally.detected[0, 0] == 0
 
 
 def test_the_way_back_notices_that_rough_ground_has_ended():
@@ -201,6 +215,18 @@ def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
     assert "--overwrite" in capsys.readouterr().err
 
 
+def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
+    log = str(table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1)))
+    command = ["identify", log, "--condition", "paper", "--alpha", "0.2", "--beta", "1000"]
+    main([*command, "--out", str(tmp_path / "report"), "--json"])
+    (row,) = json.loads(capsys.readouterr().out)["conditions"]
+    assert (row["alpha"], row["beta"], row["leak"], row["keeps_still"]) == (0.2, 1000.0, 0.0, None)
+    assert (row["came"], row["detected"]) == (1, 0)
+    readme = (tmp_path / "report" / "README.md").read_text()
+    assert "at the numbers that were given" in readme
+    assert "same logs" not in readme
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -210,6 +236,10 @@ def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
         (["{log}", "--condition", "guess"], "no condition 'guess'"),
         (["{log}", "--condition", "slip"], "lack the signals"),
         (["{smooth}"], "no rough ground"),
+        (["{log}", "--alpha", "0.2"], "--beta"),
+        (["{log}", "--leak", "1"], "--alpha and --beta"),
+        (["{log}", "--alpha", "-1", "--beta", "3"], "alpha must be positive"),
+        (["{log}", "--alpha", "1", "--beta", "3", "--condition", "all"], "another unit"),
     ],
 )
 def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, arguments, message):

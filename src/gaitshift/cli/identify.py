@@ -35,6 +35,12 @@ class Identify:
     so."""
     condition: tuple[str, ...] = ("touchdown_surprise",)
     """Conditions to compare, by name; `all` for every one that the logs feed."""
+    alpha: float | None = None
+    """Judge this α, in each condition's unit, instead of choosing one; with --beta."""
+    beta: float | None = None
+    """… and this β [counts]."""
+    leak: float | None = None
+    """… and this leak [counts a step]; 0 if left out."""
     way: Literal["rough", "flat"] = "rough"
     """What is to be noticed: rough ground ahead, or, for the way back, that it has ended."""
     out: Path
@@ -50,7 +56,7 @@ class Identify:
             from gaitshift.identification import report as reports
             from gaitshift.identification.candidates import CANDIDATES, candidates
             from gaitshift.identification.classifier import NAME, RoughnessClassifier
-            from gaitshift.identification.finding import judge, tune
+            from gaitshift.identification.finding import as_given, judge, tune
             from gaitshift.identification.sources import check_sources
         except ImportError as error:
             raise GaitshiftError(
@@ -58,7 +64,13 @@ class Identify:
             ) from error
         if not self.logs:
             raise GaitshiftError("which logs? make some with: gaitshift record trot --out logs")
+        if (self.alpha is None) != (self.beta is None) or (
+            self.leak is not None and self.alpha is None
+        ):
+            raise GaitshiftError("numbers to judge: give --alpha and --beta, and --leak if any")
         everything = "all" in self.condition
+        if everything and self.alpha is not None:
+            raise GaitshiftError("α has another unit in each condition: name those for --alpha")
         named = candidates([name for name in self.condition if name not in (NAME, "all")])
         wanted = list(CANDIDATES if everything else named)
         check_sources((*self.logs, *self.held_out))
@@ -74,7 +86,11 @@ class Identify:
                 if not everything:
                     raise
                 say(f"{error}; it is left out")
-        tuned = tune(wanted, read, way=self.way, report=_tell("choosing"))
+        if self.alpha is None or self.beta is None:
+            tuned = tune(wanted, read, way=self.way, report=_tell("choosing"))
+        else:
+            leak = self.leak or 0.0
+            tuned = as_given(wanted, way=self.way, alpha=self.alpha, beta=self.beta, leak=leak)
         missing = {c.name for c in wanted} - {t.candidate.name for t in tuned}
         if missing and not everything:
             raise GaitshiftError(f"the logs lack the signals of '{min(missing)}'")
@@ -116,6 +132,8 @@ def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
 
     pictures: dict[str, str] = {}
     for one in judged:
+        if one.tuned.choice.is_free is None:
+            continue  # nothing was tried but the numbers that were given
         name = one.tuned.candidate.name
         condition_map(one.tuned, out / f"{name}.png")
         pictures[f"{name}.png"] = f"How soon {name} notices, over α and β"

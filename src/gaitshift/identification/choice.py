@@ -30,12 +30,13 @@ class Choice:
     """β [counts]."""
     leak: float
     """What k loses in each step [counts]."""
-    cost_m: float
-    """Mean delay with misses counted [m]: what was made small."""
-    false_per_km: float
-    """False shifts a kilometre of smooth ground at this α and β."""
-    is_free: bool
-    """Whether no robot shifted on smooth ground, with headroom in β; else the fewest were taken."""
+    cost_m: float = np.nan
+    """Mean delay with misses counted [m]: what was made small; NaN where the numbers were given."""
+    false_per_km: float = np.nan
+    """False shifts a kilometre of smooth ground at this α and β; NaN where they were given."""
+    is_free: bool | None = None
+    """Whether no robot shifted on smooth ground, with headroom in β; else the fewest were taken.
+    None where the numbers were given."""
 
 
 def choose(tallies: Mapping[float, Mapping[str, Tally]], grid: Grid) -> Choice:

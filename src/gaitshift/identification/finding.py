@@ -136,6 +136,28 @@ def tune(
     return found
 
 
+def as_given(
+    candidates: Sequence[Candidate], *, way: Way, alpha: float, beta: float, leak: float = 0.0
+) -> list[Tuned]:
+    """Each candidate with the same numbers, which nobody chose: to see what they do.
+
+    Raises:
+        GaitshiftError: a number out of range.
+    """
+    _ = _rule(way, alpha, beta, leak)
+    grids = [Grid(alphas=candidate.alphas, betas=BETAS) for candidate in candidates]
+    return [
+        Tuned(
+            candidate=candidate,
+            way=way,
+            choice=Choice(alpha=alpha, beta=beta, leak=leak),
+            grid=grid,
+            tally=Tally(shape=grid.shape),
+        )
+        for candidate, grid in zip(candidates, grids, strict=True)
+    ]
+
+
 def judge(
     tuned: Sequence[Tuned],
     recordings: Recordings,

@@ -128,11 +128,16 @@ def _readme(
         if held_out
         else "The same logs chose and judged them, so the figures flatter."
     )
+    how = (
+        "Each condition was replayed at the numbers that were given."
+        if tuned.choice.is_free is None
+        else "Each condition was replayed over α, β and leaks; chosen was the soonest that never "
+        f"shifts where it should not, even at a β smaller by a quarter. {who}"
+    )
     words = (
-        f"Each condition was replayed over α, β and leaks; chosen was the soonest that never "
-        f"shifts where it should not, even at a β smaller by a quarter. {who} A step is "
-        f"{1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. Area: under the ROC "
-        f"curve of passages of {LENGTH:g} m, of the hardest course. Intervals are of 95 %."
+        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. Area: "
+        f"under the ROC curve of passages of {LENGTH:g} m, of the hardest course. Intervals are of "
+        "95 %."
     )
     parts = [f"# {_TITLES[tuned.way]}", words, f"Made by `{command}`.", "## Side by side"]
     parts.append(_conditions_table(conditions))
@@ -140,7 +145,7 @@ def _readme(
         f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "
         "chose: the one with the fewest false shifts was taken."
         for one in judged
-        if not one.tuned.choice.is_free
+        if one.tuned.choice.is_free is False
     ]
     parts += [f"![{line}]({name})" for name, line in pictures.items()]
     for one in judged:
