@@ -74,6 +74,12 @@ class Log:
         given = ((name, getattr(self, name)) for name in courses)
         return replace(self, **{name: rows[entries] for name, rows in given if rows is not None})
 
+    def robots(self, ids: slice) -> "Log":
+        """Some of the robots over the whole time; arrays are shared."""
+        courses = (f.name for f in fields(self) if not f.name.startswith((*_TIMELESS, "time")))
+        given = ((name, getattr(self, name)) for name in courses)
+        return replace(self, **{name: rows[:, ids] for name, rows in given if rows is not None})
+
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""
         part = path.with_suffix(".part.npz")

@@ -18,6 +18,7 @@ from gaitshift.cli.reproduce import Reproduce
 from gaitshift.cli.study import Study
 from gaitshift.cli.train import Train
 from gaitshift.cli.transitions import Transitions
+from gaitshift.cli.view import View
 from gaitshift.errors import GaitshiftError
 
 Command = (
@@ -30,6 +31,7 @@ Command = (
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Study, tyro.conf.subcommand("study")]
     | Annotated[Transitions, tyro.conf.subcommand("transitions")]
+    | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
 

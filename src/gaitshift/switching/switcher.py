@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.command import CONTROL_PERIOD
+from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
 from gaitshift.switching.controller import Controller
 from gaitshift.switching.graph import GaitGraph
@@ -63,6 +64,20 @@ class Autonomous:
         self._memory: dict[str, Any] = {k: s.start(n) for k, s in self._statistics.items()}
         self._k = np.zeros((n, len(graph.edges)))
         self._time_in_gait = np.zeros(n)
+
+    def retune(self, graph: GaitGraph) -> None:
+        """Goes on with other numbers on the same edges and statistics; nothing is forgotten.
+
+        Raises:
+            GaitshiftError: gaits, edges or statistics are others.
+        """
+        before, after = (
+            (g.statistics, [(e.source, e.target, e.statistic) for e in g.edges])
+            for g in (self.graph, graph)
+        )
+        if before != after:
+            raise GaitshiftError("a graph with the same edges and statistics would be right")
+        self.graph = graph
 
     def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
         """Lets the edges count; where one fires, the robot changes to the gait it leads to."""

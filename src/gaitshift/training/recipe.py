@@ -122,7 +122,7 @@ class Recipe:
     """The factor λ on all penalties at the first iteration; 1: no curriculum (paper III-D)."""
     penalty_until: int = 200
     """Iteration at which λ has grown to 1, by the same step each iteration."""
-    settle: float = 0.1
+    settle: float = 0.35
     """Last share of the iterations, in which the policy settles: `desired_kl` and `entropy` fall to
     a tenth; ours: without it the speed of the last policy is off by up to 0.2 m/s, now to this
     side, now to that."""

@@ -1,0 +1,80 @@
+"""`gaitshift view`: robots that walk in the browser, live or from a log."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from gaitshift import policy as policies
+from gaitshift.cli.output import say
+from gaitshift.errors import GaitshiftError
+from gaitshift.log import Log
+from gaitshift.switching import load_condition
+
+_LOCAL = ("127.0.0.1", "localhost", "::1")
+
+
+@dataclass(frozen=True, kw_only=True)
+class View:
+    """Watch robots in the browser: live, with their condition in your hands, or from a log.
+
+    Prints the address of the page; Ctrl-C ends it. Needs no screen and no OpenGL on this machine.
+    """
+
+    log: Annotated[Path | None, tyro.conf.Positional] = None
+    """A log of `demo`, `evaluate`, `record` or of this page; without one robots walk live."""
+    track: str = "flat@8,perlin:0.10@12,flat@10"
+    """The ground, piece by piece with lengths in metres."""
+    robots: int = 1
+    """Robots on the track, 1 to 16; charts tell of the first."""
+    condition: str = "height_difference"
+    """When to shift from trot to bound and back, by name."""
+    seed: int = 0
+    """Seed of the ground and of the starts."""
+    host: str = "127.0.0.1"
+    """Address to listen on; any other than this machine's own lets others give orders too."""
+    port: int = 8080
+    """Port to listen on."""
+    out: Path = Path("gaitshift-view")
+    """Folder for recordings."""
+
+    def run(self) -> None:
+        """Opens the page, and keeps it until Ctrl-C."""
+        try:
+            from gaitshift.viewer import LiveConfig, LivePage, LiveRun, ReplayPage, close, serve
+        except ImportError as error:
+            raise GaitshiftError(
+                f"view needs the package '{error.name}'; install gaitshift[view]"
+            ) from error
+        config = LiveConfig(
+            track=self.track,
+            robots=self.robots,
+            condition=load_condition(self.condition),
+            seed=self.seed,
+        )
+        if self.log is None:
+            shipped = {name: policies.load(name) for name in _in_order(policies.shipped())}
+            shown = LiveRun(config, shipped)
+        else:
+            shown = Log.load(self.log)
+        if self.host not in _LOCAL:
+            say(f"whoever reaches {self.host} can see this page and give orders to the robots")
+        server = serve(self.host, self.port)
+        try:
+            if isinstance(shown, Log):
+                page = ReplayPage(server, shown)
+            else:
+                page = LivePage(server, shown, self.out)
+            print(f"open http://{self.host}:{self.port} (Ctrl-C ends)", flush=True)
+            page.run()
+        except KeyboardInterrupt:
+            say("gaitshift: the page is closed")
+        finally:
+            close(server)
+
+
+def _in_order(names: tuple[str, ...]) -> tuple[str, ...]:
+    """The paper's gaits first."""
+    first = ("trot", "bound", "pace")
+    return tuple(sorted(names, key=lambda name: (name not in first, name)))

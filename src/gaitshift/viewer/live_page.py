@@ -1,0 +1,297 @@
+"""The live page: robots walk, and whoever looks at it gives orders."""
+
+import math
+import queue
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import viser
+
+from gaitshift.command import CONTROL_PERIOD
+from gaitshift.errors import GaitshiftError
+from gaitshift.switching import CONDITIONS, Condition
+from gaitshift.viewer.charts import Charts
+from gaitshift.viewer.frame import Frame, Tape
+from gaitshift.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, LiveRun, with_amplitude
+from gaitshift.viewer.scene import Scene
+from gaitshift.viewer.server import TICK, Clock
+
+_CHARTS_EVERY = 6
+"""Pictures between two of the charts."""
+
+_STEPS = round(TICK / CONTROL_PERIOD)
+"""Control steps from picture to picture at real time."""
+
+_GAITS_A_ROW = 4
+"""Buttons for gaits beside each other."""
+
+
+class LivePage:
+    """Puts a `LiveRun` on a page. Orders are taken between two steps, by the thread that runs."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        live: LiveRun,
+        out: Path,
+    ) -> None:
+        """Recordings go into the folder `out`."""
+        self._server, self._out = server, out
+        self._live = live
+        self._scene = Scene(server, live.robot, live.gaits)
+        self._tape = Tape()
+        self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._paused, self._single = False, False
+        self._factor = 1.0
+        self._owed = 0.0
+        self._build()
+        self._show_ground()
+
+    def run(self, until: Callable[[], bool] = lambda: False) -> None:
+        """Walks and draws until told to end, or for ever."""
+        clock, picture = Clock(), 0
+        while not until():
+            self._obey()
+            frame = self._advance()
+            if frame is not None:
+                self._scene.draw(frame)
+                picture += 1
+                if picture % _CHARTS_EVERY == 0 or self._paused:
+                    self._charts.draw(self._tape)
+                    self._tell(frame)
+            clock.wait()
+
+    def _advance(self) -> Frame | None:
+        """The steps that are due, and the last frame; None where nothing moved."""
+        if self._paused and not self._single:
+            return None
+        self._owed = 1.0 if self._single else self._owed + _STEPS * self._factor
+        self._single = False
+        frame: Frame | None = None
+        while self._owed >= 1.0:
+            self._owed -= 1.0
+            frame = self._live.step()
+            self._tape.add(frame)
+        if self._live.is_over:
+            self._restart(replace(self._live.config, seed=self._live.config.seed + 1))
+        return frame
+
+    # What stands in the panels --------------------------------------------------------------------
+
+    def _build(self) -> None:
+        gui, config = cast(Any, self._server.gui), self._live.config
+        panel = gui.add_panel()
+        with panel.add_tab("Signals"):
+            self._charts = Charts(self._server, self._live.machines)
+        panel.dock_left()
+        panel.set_width(340)
+        self._status = gui.add_markdown("")
+        self._build_clock(gui)
+        with gui.add_folder("Gait"):
+            self._build_gaits(gui, config)
+        with gui.add_folder("Condition"):
+            self._build_condition(gui, config.condition)
+        with gui.add_folder("Push"):
+            force = gui.add_slider("force [N]", min=0, max=300, step=10, initial_value=120)
+            way = gui.add_dropdown("direction", tuple(DIRECTIONS), initial_value="left")
+            self._on_click(
+                gui.add_button("push"),
+                lambda: self._live.push(float(force.value), DIRECTIONS[way.value]),
+            )
+        with gui.add_folder("Ground", expand_by_default=False):
+            self._build_ground(gui, config)
+        with gui.add_folder("Recording", expand_by_default=False):
+            self._record = gui.add_button("record")
+            self._on_click(self._record, self._toggle_recording)
+
+    def _build_clock(self, gui: Any) -> None:
+        pause = gui.add_button("pause")
+        others = gui.add_button_group("", ("one step", "restart"))
+        pace = gui.add_slider("times real time", min=0.1, max=2.0, step=0.1, initial_value=1.0)
+        follow = gui.add_checkbox("camera follows", True)
+
+        def toggle() -> None:
+            self._paused = not self._paused
+            pause.label = "go on" if self._paused else "pause"
+
+        self._on_click(pause, toggle)
+
+        def other(chosen: str) -> None:
+            if chosen == "restart":
+                self._restart(self._live.config)
+            else:
+                self._single = True
+
+        self._on_choice(others, other)
+        self._on_update(pace, lambda: setattr(self, "_factor", float(pace.value)))
+        self._on_update(follow, lambda: setattr(self._scene, "follows", bool(follow.value)))
+
+    def _build_gaits(self, gui: Any, config: LiveConfig) -> None:
+        alone = gui.add_checkbox(
+            "shifts by itself", config.is_autonomous, hint="trot on flat, bound on rough ground"
+        )
+        self._on_update(alone, lambda: self._change(is_autonomous=bool(alone.value)))
+        names = {gait.replace("_", "-"): gait for gait in self._live.gaits}
+        for row in range(0, len(names), _GAITS_A_ROW):
+            some = gui.add_button_group("", tuple(names)[row : row + _GAITS_A_ROW])
+            self._on_choice(some, lambda chosen: self._live.take(names[chosen]))
+        own = gui.add_checkbox("the gait's own speed and stride", True)
+        speed = gui.add_slider(
+            "speed [m/s]", min=0.2, max=1.6, step=0.05, initial_value=1.2, disabled=True
+        )
+        stride = gui.add_slider(
+            "stride [Hz]", min=1.0, max=3.5, step=0.1, initial_value=2.5, disabled=True
+        )
+
+        def command() -> None:
+            speed.disabled = stride.disabled = bool(own.value)
+            self._change(
+                speed=None if own.value else float(speed.value),
+                stride_frequency=None if own.value else float(stride.value),
+            )
+
+        for handle in (own, speed, stride):
+            self._on_update(handle, command)
+
+    def _build_condition(self, gui: Any, condition: Condition) -> None:
+        names = tuple(CONDITIONS)
+        name = gui.add_dropdown("condition", names, initial_value=names[0])
+        slider = gui.add_slider
+        numbers = {
+            "alpha": slider("α [m]", min=0.005, max=0.3, step=0.005, initial_value=condition.alpha),
+            "beta": slider("β [counts]", min=0, max=1500, step=10, initial_value=condition.beta),
+            "leak": slider("leak [counts/step]", min=0, max=6, step=0.1, initial_value=0.0),
+            "alpha_back": slider(
+                "α' [m]", min=0.005, max=0.3, step=0.005, initial_value=condition.alpha_back
+            ),
+            "beta_back": slider(
+                "β' [counts]", min=0, max=1500, step=10, initial_value=condition.beta_back
+            ),
+        }
+
+        def tuned() -> None:
+            values = {key: float(handle.value) for key, handle in numbers.items()}
+            self._change(condition=replace(CONDITIONS[name.value], **values))
+
+        def choose() -> None:
+            for key, handle in numbers.items():
+                handle.value = getattr(CONDITIONS[name.value], key)
+            self._change(condition=CONDITIONS[name.value])
+
+        self._on_update(name, choose)
+        for handle in numbers.values():
+            self._on_update(handle, tuned)
+
+    def _build_ground(self, gui: Any, config: LiveConfig) -> None:
+        track = gui.add_text("track", config.track)
+        height = gui.add_slider(
+            "noise [m]", min=0.0, max=0.25, step=0.01, initial_value=_amplitude(config.track)
+        )
+        seed = gui.add_number("seed", config.seed, min=0, step=1)
+        robots = gui.add_slider(
+            "robots", min=1, max=MOST_ROBOTS, step=1, initial_value=config.robots
+        )
+
+        def walk_anew() -> None:
+            asked = {"track": track.value, "seed": int(seed.value), "robots": int(robots.value)}
+            self._restart(replace(self._live.config, **asked))
+
+        def raise_noise() -> None:
+            track.value = with_amplitude(track.value, float(height.value))
+
+        self._on_update(height, raise_noise)
+        self._on_click(gui.add_button("walk there"), walk_anew)
+        self._seed = seed
+
+    # Orders ---------------------------------------------------------------------------------------
+
+    def _on_click(self, button: Any, order: Callable[[], None]) -> None:
+        def enqueue(_: Any) -> None:
+            self._orders.put(order)
+
+        button.on_click(enqueue)
+
+    def _on_choice(self, group: Any, order: Callable[[str], None]) -> None:
+        def enqueue(event: Any) -> None:
+            chosen = str(event.target.value)
+            self._orders.put(lambda: order(chosen))
+
+        group.on_click(enqueue)
+
+    def _on_update(self, handle: Any, order: Callable[[], None]) -> None:
+        def enqueue(event: Any) -> None:
+            if event.client is not None:  # not what the page itself has set
+                self._orders.put(order)
+
+        handle.on_update(enqueue)
+
+    def _obey(self) -> None:
+        """Carries out the orders that came in; what cannot be done is told on the page."""
+        while True:
+            try:
+                order = self._orders.get_nowait()
+            except queue.Empty:
+                return
+            try:
+                order()
+            except GaitshiftError as error:
+                self._notify("that cannot be done", str(error), "red")
+
+    def _change(self, **values: Any) -> None:
+        self._live.change(replace(self._live.config, **values))
+
+    def _restart(self, config: LiveConfig) -> None:
+        self._save_recording()
+        before = self._live.ground
+        self._live.restart(config)
+        self._tape.clear()
+        self._seed.value = config.seed
+        if self._live.ground is not before:
+            self._show_ground()
+
+    def _show_ground(self) -> None:
+        self._scene.set_ground(self._live.ground)
+        self._scene.set_robots(self._live.config.robots)
+
+    def _toggle_recording(self) -> None:
+        if self._live.is_recording:
+            self._save_recording()
+        else:
+            self._live.record()
+            self._record.label = "end and save"
+
+    def _save_recording(self) -> None:
+        log = self._live.end_recording()
+        self._record.label = "record"
+        if log is None:
+            return
+        self._out.mkdir(parents=True, exist_ok=True)
+        path = self._out / "log.npz"
+        log.save(path)
+        self._notify("recorded", f"{path}: gaitshift view {path} shows it again", "green")
+
+    def _notify(self, title: str, body: str, colour: str) -> None:
+        for client in self._server.get_clients().values():
+            cast(Any, client).add_notification(title, body, color=colour)
+
+    def _tell(self, frame: Frame) -> None:
+        gait = self._live.gaits[int(frame.gait[0])].replace("_", "-")
+        x = float(frame.qpos[0, 0])
+        count = f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f}" if frame.threshold[0] else "–"
+        state = "fallen" if frame.fallen[0] else f"{frame.speed[0]:.2f} m/s"
+        self._status.content = f"**{gait}** · {state} · {x:.1f} m · {frame.time:.1f} s · {count}"
+
+
+def _amplitude(track: str) -> float:
+    """Of the first noise on a track, as far as the slider goes [m]."""
+    for piece in track.split(","):
+        kind, _, number = piece.strip().partition(":")
+        if kind == "perlin":
+            try:
+                amplitude = float(number.partition("@")[0])
+            except ValueError:
+                break
+            return min(amplitude, 0.25) if math.isfinite(amplitude) else 0.1
+    return 0.1

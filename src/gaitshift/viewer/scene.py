@@ -1,0 +1,173 @@
+"""The three-dimensional part of a page: ground, robots, lit feet, and the plane through touches."""
+
+from typing import Any, cast
+
+import numpy as np
+import trimesh
+import viser
+from jaxtyping import Float
+from PIL import ImageColor
+
+from gaitshift.plots.palette import gait_colours
+from gaitshift.robot import Robot
+from gaitshift.terrain import Terrain
+from gaitshift.viewer.frame import Frame
+from gaitshift.viewer.shape import Shape, coloured
+
+_FINE = 0.08
+"""The ground is drawn with samples this far apart at the finest [m]."""
+
+_LOW, _MIDDLE, _HIGH = (np.array(c) for c in ((150, 136, 120), (205, 194, 178), (238, 233, 224)))
+"""Colours of the ground at its lowest, at level 0 and at its highest."""
+
+_CHECK = 1.0
+"""Edge of the squares on the ground, which show how fast a robot goes [m]."""
+
+_DARK = (70, 75, 82)
+"""A foot that does not touch."""
+
+_PLANE = 0.55, 0.4
+"""Half of the length and width of the plane through the touches [m]."""
+
+_FOLLOW = 0.08
+"""Share of the way to the robot that the camera goes in each frame."""
+
+
+class Scene:
+    """What is drawn of one ground and N robots; everything stands in the frame `/world`."""
+
+    def __init__(self, server: viser.ViserServer, robot: Robot, gaits: tuple[str, ...]) -> None:
+        self._scene = cast(Any, server.scene)
+        self._shape = Shape(robot)
+        self._radius = robot.foot_radius
+        self._palette = np.array(
+            [ImageColor.getrgb(colour)[:3] for colour in gait_colours(gaits).values()]
+        )
+        self._scene.set_up_direction("+z")
+        self._scene.configure_default_lights(enabled=True, cast_shadow=True)
+        self._root = self._scene.add_frame("/world", show_axes=False)
+        self._bodies: list[Any] = []
+        self._feet: Any = None
+        self._touches: Any = None
+        self._plane: Any = None
+        self.follows = True
+        """Whether the world moves so that the first robot stays where it is in the picture."""
+        self._centre = np.zeros(3)
+
+    def set_ground(self, ground: Terrain) -> None:
+        """Draws another ground."""
+        self._scene.add_mesh_trimesh("/world/ground", ground_mesh(ground), cast_shadow=False)
+
+    def set_robots(self, n: int) -> None:
+        """Draws this many robots from now on."""
+        pose = {
+            "batched_wxyzs": np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
+            "batched_positions": np.zeros((n, 3)),
+        }
+        self._bodies = [
+            self._scene.add_batched_meshes_trimesh(
+                f"/world/robot/{body.name}", body.mesh, lod="off", **pose
+            )
+            for body in self._shape.bodies
+        ]
+        ball = cast(Any, trimesh.creation).icosphere(subdivisions=2, radius=1.25 * self._radius)
+        self._feet = self._balls("feet", ball, 4 * n)
+        dot = cast(Any, trimesh.creation).icosphere(subdivisions=1, radius=0.018)
+        self._touches = self._balls("touches", dot, 4)
+        self._plane = self._scene.add_mesh_simple(
+            "/world/plane",
+            vertices=np.zeros((4, 3)),
+            faces=np.array([[0, 1, 2], [0, 2, 3]]),
+            color=(0, 114, 178),
+            opacity=0.25,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+
+    def draw(self, frame: Frame) -> None:
+        """Shows a frame."""
+        position, rotation = self._shape.poses(frame.qpos)
+        for handle, where, turned in zip(self._bodies, position, rotation, strict=True):
+            handle.batched_positions = where.astype(np.float32)
+            handle.batched_wxyzs = turned.astype(np.float32)
+        feet = frame.foot_position_w + np.array([0.0, 0.0, self._radius])
+        self._feet.batched_positions = feet.reshape(-1, 3).astype(np.float32)
+        lit = self._palette[frame.gait][:, None, :]
+        colours = np.where(frame.contact[..., None], lit, _DARK).reshape(-1, 3)
+        self._feet.batched_colors = colours.astype(np.uint8)
+        self._draw_plane(frame.touch_w[0])
+        if self.follows:
+            base = frame.qpos[0, :3] * np.array([1.0, 1.0, 0.0])
+            far = np.linalg.norm(base - self._centre) > 3.0
+            self._centre = base if far else self._centre + _FOLLOW * (base - self._centre)
+            self._root.position = -self._centre
+
+    def _draw_plane(self, touch_w: Float[np.ndarray, "4 3"]) -> None:
+        """The last touches of the first robot, and the plane through them."""
+        known = bool(np.isfinite(touch_w).all())
+        self._touches.visible = self._plane.visible = known
+        if not known:
+            return
+        self._touches.batched_positions = touch_w.astype(np.float32)
+        self._plane.vertices = plane_corners(touch_w).astype(np.float32)
+
+    def _balls(self, name: str, mesh: trimesh.Trimesh, count: int) -> Any:
+        return self._scene.add_batched_meshes_simple(
+            f"/world/{name}",
+            vertices=mesh.vertices,
+            faces=mesh.faces,
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            batched_positions=np.zeros((count, 3)),
+            batched_colors=np.tile(np.array([230, 159, 0], dtype=np.uint8), (count, 1)),
+            lod="off",
+            cast_shadow=False,
+        )
+
+
+def plane_corners(points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
+    """Corners of a piece of the plane of least squares through points, about their middle [m]."""
+    middle = points.mean(axis=0)
+    offset = points - middle
+    slope = cast(Any, np.linalg).lstsq(offset[:, :2], offset[:, 2], rcond=1e-3)[0]
+    length, width = _PLANE
+    corners = np.array([[-length, -width], [length, -width], [length, width], [-length, width]])
+    return np.column_stack([corners, corners @ slope]) + middle
+
+
+def ground_mesh(ground: Terrain) -> trimesh.Trimesh:
+    """A ground as a mesh, coloured by height, with squares of a metre."""
+    (dx, dy), (x0, y0) = ground.cell, ground.origin
+    length, width = ground.size
+    fine = 0.25 if ground.is_flat else _FINE
+    columns = np.linspace(0.0, length, max(2, round(length / max(fine, dx)) + 1))
+    rows = np.linspace(0.0, width, max(2, round(width / max(fine, dy)) + 1))
+    x, y = np.meshgrid(x0 + columns, y0 + rows)
+    height = ground.height_at(np.stack([x, y], axis=-1))
+    i, j = np.meshgrid(np.arange(len(rows) - 1), np.arange(len(columns) - 1), indexing="ij")
+    corner = (i * len(columns) + j).ravel()
+    right, above = corner + 1, corner + len(columns)
+    faces = np.concatenate(
+        [
+            np.column_stack([corner, right, above + 1]),
+            np.column_stack([corner, above + 1, above]),
+        ]
+    )
+    mesh = trimesh.Trimesh(
+        vertices=np.column_stack([x.ravel(), y.ravel(), height.ravel()]), faces=faces, process=False
+    )
+    return coloured(mesh, _ground_colours(x.ravel(), y.ravel(), height.ravel()))
+
+
+def _ground_colours(
+    x: Float[np.ndarray, " V"], y: Float[np.ndarray, " V"], height: Float[np.ndarray, " V"]
+) -> np.ndarray:
+    reach = max(float(np.abs(height).max()), 0.05)
+    share = np.clip(height / reach, -1.0, 1.0)[:, None]
+    colour = np.where(
+        share < 0, _MIDDLE + share * (_MIDDLE - _LOW), _MIDDLE + share * (_HIGH - _MIDDLE)
+    )
+    is_dark = (np.floor(x / _CHECK) + np.floor(y / _CHECK)) % 2 == 0
+    colour = colour * np.where(is_dark, 0.94, 1.0)[:, None]
+    return np.column_stack([colour, np.full(len(colour), 255.0)]).astype(np.uint8)

@@ -1,0 +1,74 @@
+"""The page's server: its address and its looks, and the clock that keeps real time."""
+
+import io
+import socket
+import time
+from contextlib import redirect_stdout
+from typing import Any, cast
+
+import viser
+
+from gaitshift.errors import GaitshiftError
+
+TICK = 0.02
+"""Time between two pictures [s]."""
+
+_LATE = 0.25
+"""A clock that is late by more lets the time go that it lost [s]."""
+
+_CAMERA = (-1.6, -2.4, 1.3)
+"""Where one looks from at first, towards the origin [m]."""
+
+
+def serve(host: str, port: int) -> viser.ViserServer:
+    """Opens the page.
+
+    Raises:
+        GaitshiftError: the address or port cannot be had.
+    """
+    if not 1 <= port <= 65535:
+        raise GaitshiftError(f"port {port}: 1 to 65535 would be right")
+    with socket.socket() as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            raise GaitshiftError(
+                f"{host}:{port} cannot be had ({error.strerror}); another --port would be right"
+            ) from error
+    with redirect_stdout(io.StringIO()):  # it prints a box of its own
+        server = viser.ViserServer(host=host, port=port, label="gaitshift", verbose=False)
+    gui = cast(Any, server.gui)
+    gui.configure_theme(
+        show_logo=False,
+        show_share_button=False,
+        brand_color=(0, 114, 178),
+    )
+    gui.set_panel_label("gaitshift")
+    gui.main_panel.dock_right()
+    gui.main_panel.set_width(330)
+    server.initial_camera.position = _CAMERA
+    server.initial_camera.look_at = (0.0, 0.0, 0.35)
+    return server
+
+
+def close(server: viser.ViserServer) -> None:
+    """Closes the page."""
+    with redirect_stdout(io.StringIO()):
+        server.stop()
+
+
+class Clock:
+    """Waits from picture to picture, at a multiple of real time."""
+
+    def __init__(self) -> None:
+        self._due = time.perf_counter()
+
+    def wait(self) -> None:
+        """Until the next picture is due."""
+        self._due += TICK
+        left = self._due - time.perf_counter()
+        if left > 0:
+            time.sleep(left)
+        elif left < -_LATE:
+            self._due = time.perf_counter()

@@ -1,0 +1,363 @@
+"""Pages in the browser: the robots behind them, what is drawn, and the pages themselves."""
+
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gaitshift import gaits, policy
+from gaitshift.cli import main
+from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import DemoConfig, run_demo
+from gaitshift.log import Log
+from gaitshift.robot import ANYMAL_B
+from gaitshift.switching import load_condition
+from gaitshift.terrain import from_spec
+from gaitshift.viewer.charts import contact_svg, machine_svg
+from gaitshift.viewer.frame import WINDOW, Tape, frames_of
+from gaitshift.viewer.live import LiveConfig, LiveRun, with_amplitude
+from gaitshift.viewer.scene import ground_mesh, plane_corners
+from gaitshift.viewer.shape import Shape
+
+TRACK = "flat@3,perlin:0.12@5,flat@2"
+
+
+@pytest.fixture(scope="module")
+def policies():
+    return {name: policy.load(name) for name in ("trot", "bound", "pace")}
+
+
+def walk(run, seconds):
+    frames = [run.step()]
+    while frames[-1].time < seconds - 1e-9 and not run.is_over:
+        frames.append(run.step())
+    return frames
+
+
+# Robots that walk now -----------------------------------------------------------------------------
+
+
+def test_a_live_robot_does_what_the_demonstrations_robot_does(policies):
+    """The demonstration is a rollout of its own, with the same ground, start and condition."""
+    config = DemoConfig(track=TRACK, seed=3, beta=80.0)
+    log, _ = run_demo(config, {gait: policies[gait] for gait in config.used})
+    condition = load_condition(config.condition, beta=80.0)
+    run = LiveRun(LiveConfig(track=TRACK, seed=3, condition=condition), policies)
+    frames = walk(run, 5.0)
+    names = [run.gaits[int(frame.gait[0])] for frame in frames]
+    assert names == [log.gaits[g] for g in log.gait[: len(names), 0]]
+    assert "bound" in names
+    ours, theirs = np.array([f.qpos[0] for f in frames]), log.qpos[: len(frames), 0]
+    np.testing.assert_allclose(ours, theirs, atol=1e-5)
+    np.testing.assert_allclose([f.k[0] for f in frames], log.k[: len(frames), 0])
+
+
+def test_alpha_acts_at_once_and_the_count_goes_on_from_where_it_was(policies):
+    run = LiveRun(LiveConfig(track="perlin:0.12@20"), policies)
+    before = next(frame for frame in iter(run.step, None) if frame.k[0] > 20)
+    run.change(replace(run.config, condition=replace(run.config.condition, alpha=2.0)))
+    after = walk(run, before.time + 1.0)
+    assert {float(frame.k[0]) for frame in after} == {float(before.k[0])}, "no feet differ by 2 m"
+    run.change(
+        replace(run.config, condition=replace(run.config.condition, beta=float(before.k[0])))
+    )
+    run.change(replace(run.config, condition=replace(run.config.condition, alpha=0.01)))
+    assert any(run.gaits[int(f.gait[0])] == "bound" for f in walk(run, after[-1].time + 0.5))
+
+
+def test_robots_that_are_not_to_shift_do_not_and_take_the_gait_they_are_given(policies):
+    run = LiveRun(LiveConfig(track="perlin:0.12@20", is_autonomous=False, robots=3), policies)
+    frames = walk(run, 3.0)
+    assert {int(g) for frame in frames for g in frame.gait} == {run.gaits.index("trot")}
+    assert frames[-1].threshold.tolist() == [0.0, 0.0, 0.0]
+    run.take("pace")
+    assert run.step().gait.tolist() == [run.gaits.index("pace")] * 3
+
+
+def test_a_push_gives_the_robot_its_force_over_mass_and_ends(policies):
+    """30 N for 0.2 s on 30 kg in flight would be 0.2 m/s; feet on the ground take some of it."""
+    config = LiveConfig(track="flat@30", is_autonomous=False)
+    quiet, pushed = (LiveRun(config, policies) for _ in range(2))
+    walk(quiet, 2.0), walk(pushed, 2.0)
+    pushed.push(90.0, np.pi / 2)
+    sideways = [
+        (b.qpos[0, 1] - a.qpos[0, 1])
+        for a, b in zip(walk(quiet, 2.3), walk(pushed, 2.3), strict=True)
+    ]
+    assert sideways[0] == pytest.approx(0.0, abs=1e-3)
+    assert 0.02 < sideways[-1] < 0.2
+
+
+def test_a_run_is_over_at_the_end_of_the_track_or_after_a_fall(policies):
+    run = LiveRun(LiveConfig(track="flat@3", is_autonomous=False), policies)
+    frames = walk(run, 10.0)
+    assert run.is_over
+    assert frames[-1].qpos[0, 0] == pytest.approx(3.0, abs=0.05)
+    run.restart(replace(run.config, track="flat@60"))
+    assert not run.is_over
+    walk(run, 1.0)
+    run._walk.fallen[0] = True
+    frames = walk(run, 10.0)
+    fell = next(frame.time for frame in frames if frame.fallen[0])
+    assert frames[-1].time == pytest.approx(fell + 2.0, abs=0.03)
+
+
+def test_another_speed_is_walked_without_beginning_anew(policies):
+    run = LiveRun(LiveConfig(track="flat@30", is_autonomous=False), policies)
+    walk(run, 2.0)
+    run.change(replace(run.config, speed=0.6, stride_frequency=2.0))
+    frames = walk(run, 6.0)
+    assert frames[0].time > 2.0
+    assert np.mean([frame.speed[0] for frame in frames[200:]]) == pytest.approx(0.6, abs=0.08)
+
+
+def test_what_was_recorded_is_a_log_of_what_was_seen(policies, tmp_path):
+    run = LiveRun(LiveConfig(track=TRACK, robots=2), policies)
+    walk(run, 1.0)
+    assert run.end_recording() is None
+    run.record()
+    seen = walk(run, 1.5)
+    log = run.end_recording()
+    assert not run.is_recording
+    log.save(tmp_path / "log.npz")
+    again = frames_of(Log.load(tmp_path / "log.npz"), 1)
+    assert len(again) == len(seen) == 50
+    for one, other in zip(again, seen, strict=True):
+        for name in ("qpos", "contact", "k", "threshold", "gait", "speed", "foot_height"):
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"robots": 17}, "1 to 16"),
+        ({"seed": -1}, "0 or larger"),
+        ({"track": "moon@3"}, "moon"),
+        ({"rough_gait": "walk"}, "no policy for the gait 'walk'"),
+    ],
+)
+def test_what_cannot_be_had_is_refused_and_all_stays_as_it_was(policies, change, message):
+    run = LiveRun(LiveConfig(track="flat@5"), policies)
+    before = walk(run, 0.2)[-1]
+    with pytest.raises(GaitshiftError, match=re.escape(message)):
+        run.restart(replace(run.config, **change))
+    assert run.step().time == pytest.approx(before.time + 0.01)
+
+
+def test_only_noise_is_made_higher():
+    track = "flat@8, perlin:0.10@12,slope:5@3,perlin:0.2@4"
+    assert with_amplitude(track, 0.05) == "flat@8,perlin:0.050@12,slope:5@3,perlin:0.050@4"
+    from_spec(with_amplitude(track, 0.05), seed=0, length=1.0, width=4.0)
+
+
+# What is drawn ------------------------------------------------------------------------------------
+
+
+def test_bodies_stand_where_the_model_has_them():
+    """In its stance the robot's lowest points are its feet, a stance height below the base."""
+    shape = Shape(ANYMAL_B)
+    qpos = np.zeros((2, 19))
+    qpos[:, 2], qpos[:, 3], qpos[:, 7:] = ANYMAL_B.stance_height, 1.0, ANYMAL_B.stance_angles
+    qpos[1, :2] = 5.0, -3.0
+    position, rotation = shape.poses(qpos)
+    assert position.shape == (len(shape.bodies), 2, 3)
+    np.testing.assert_allclose(position[:, 1] - position[:, 0], np.tile([5.0, -3.0, 0.0], (13, 1)))
+    np.testing.assert_allclose(np.linalg.norm(rotation, axis=2), 1.0)
+    lowest = {}
+    for index, body in enumerate(shape.bodies):
+        w, x, y, z = rotation[index, 0]
+        up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+        lowest[body.name] = float((body.mesh.vertices @ up).min() + position[index, 0, 2])
+    feet = [height for name, height in lowest.items() if "shank" in name]
+    assert feet == pytest.approx([0.0] * 4, abs=0.002)
+    assert min(height for name, height in lowest.items() if "shank" not in name) > 0.1
+
+
+def test_the_plane_goes_through_touches_that_lie_in_one():
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.uniform(-0.4, 0.4, (4, 2)), np.zeros(4)])
+    points[:, 2] = 0.3 * points[:, 0] - 0.2 * points[:, 1] + 0.1
+    corners = plane_corners(points)
+    expected = 0.3 * corners[:, 0] - 0.2 * corners[:, 1] + 0.1
+    np.testing.assert_allclose(corners[:, 2], expected, atol=1e-9)
+
+
+def test_touches_on_one_line_give_a_plane_that_is_not_tilted_across_it():
+    points = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.1], [0.4, 0.0, 0.2], [0.6, 0.0, 0.3]])
+    corners = plane_corners(points)
+    np.testing.assert_allclose(corners[:, 2], corners[:, 0] / 2, atol=1e-9)
+
+
+def test_the_drawn_ground_is_the_ground():
+    ground = from_spec("flat@2,perlin:0.15@4", seed=1, length=1.0, width=3.0)
+    mesh = ground_mesh(ground)
+    np.testing.assert_allclose(mesh.vertices[:, 2], ground.height_at(mesh.vertices[:, :2]))
+    assert mesh.extents[:2] == pytest.approx([6.0, 3.0])
+    assert (mesh.face_normals[:, 2] > 0).all(), "it is seen from above"
+    assert len(mesh.vertices) < 6.0 * 3.0 / 0.07**2
+
+
+def test_a_tape_keeps_the_window_and_forgets_what_lies_ahead(policies):
+    run, tape = LiveRun(LiveConfig(track="flat@40"), policies), Tape()
+    frames = walk(run, WINDOW + 1.0)
+    for frame in frames:
+        tape.add(frame)
+    time_ = tape.of("time")
+    assert (time_[-1], len(time_)) == (pytest.approx(WINDOW + 1.0), round(100 * WINDOW) + 1)
+    tape.add(frames[400])
+    assert tape.of("time")[-1] == frames[400].time
+    assert (np.diff(tape.of("time")) > 0).all()
+
+
+def test_the_diagram_has_a_bar_for_each_time_that_a_foot_is_down(policies):
+    run, tape = LiveRun(LiveConfig(track="flat@40", is_autonomous=False), policies), Tape()
+    for frame in walk(run, 4.0):
+        tape.add(frame)
+    contact = tape.of("contact").astype(int)
+    stances = int((np.diff(contact, axis=0) > 0).sum() + contact[0].sum())
+    svg = contact_svg(tape, ("#111111", "#222222", "#333333"))
+    bars = re.findall(r'width="([\d.]+)" height="12" fill="#111111"', svg)
+    assert len(bars) == stances > 20
+    # 300 units are the window.
+    assert sum(map(float, bars)) == pytest.approx(300 * contact.sum() / 100 / WINDOW, rel=0.05)
+
+
+@pytest.mark.parametrize("name", gaits.names())
+def test_the_present_state_of_the_machine_is_lit(name):
+    machine = gaits.load(name)
+    for state, one in enumerate(machine.states):
+        svg = machine_svg(machine, state, "#123456")
+        (lit,) = re.findall(r'fill="#123456".*?>([A-Z a-z]+)</text>', svg)
+        assert set(lit.split()) == (set(one.stance) or {"no", "foot"})
+        assert svg.count("<g>") == len(machine.states)
+
+
+# The command --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nowhere.npz"], "no log file nowhere.npz"),
+        (["--robots", "40"], "1 to 16"),
+        (["--condition", "guess"], "unknown condition 'guess'"),
+        (["--port", "70000"], "1 to 65535"),
+        (["--track", "moon@3"], "moon"),
+        (["--host", "203.0.113.7"], "203.0.113.7:8080 cannot be had"),
+    ],
+)
+def test_bad_input_of_view_is_one_line_and_code_2(capsys, arguments, message):
+    with pytest.raises(SystemExit) as end:
+        main(["view", *arguments])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_a_port_that_is_taken_is_named(capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(SystemExit) as end:
+            main(["view", "--port", str(port)])
+    assert end.value.code == 2
+    assert f"127.0.0.1:{port} cannot be had" in capsys.readouterr().err
+
+
+# In a browser -------------------------------------------------------------------------------------
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+
+
+def free_port():
+    with socket.socket() as some:
+        some.bind(("127.0.0.1", 0))
+        return some.getsockname()[1]
+
+
+@pytest.fixture
+def served(tmp_path):
+    """Starts `gaitshift view` with these arguments: its address; ended by Ctrl-C."""
+    started = []
+
+    def start(*arguments):
+        port = free_port()
+        command = [sys.executable, "-m", "gaitshift", "view", *arguments, "--port", str(port)]
+        process = subprocess.Popen(
+            [*command, "--out", str(tmp_path / "recorded")],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        assert any("open http" in line for line in iter(process.stdout.readline, ""))
+        return process, f"http://127.0.0.1:{port}"
+
+    yield start
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def browser():
+    sync_api = pytest.importorskip("playwright.sync_api")
+    flags = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+    with sync_api.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=CHROMIUM, args=flags)
+        yield browser
+        browser.close()
+
+
+def opened(browser, address):
+    """A page on the address, and what went wrong on it."""
+    page, wrong = browser.new_page(viewport={"width": 1000, "height": 640}), []
+    page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.set_default_timeout(90_000)
+    page.goto(address, wait_until="commit")
+    page.get_by_text("real time").first.wait_for()
+    return page, wrong
+
+
+def status(page):
+    """Gait, way [m] and time [s] as the page tells them."""
+    text = page.locator("p", has_text=" · ").first.inner_text()
+    gait, _, way, clock, *_ = text.split(" · ")
+    return gait, float(way.removesuffix(" m")), float(clock.removesuffix(" s"))
+
+
+def wait_until(true, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not come about"
+        time.sleep(0.3)
+
+
+@pytest.mark.slow
+@needs_browser
+def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
+    process, address = served("--track", "flat@200")
+    page, wrong = opened(browser, address)
+    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
+    first = status(page)
+    assert first[0] == "trot"
+    wait_until(lambda: status(page)[1] > first[1] + 1.0)
+    page.get_by_role("button", name="pace", exact=True).click()
+    wait_until(lambda: status(page)[0] == "pace")
+    page.reload(wait_until="commit")
+    page.get_by_text("real time").first.wait_for()
+    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
+    assert status(page)[0] == "pace", "it goes on as it was"
+    assert not wrong
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 0
+    assert "closed" in process.stderr.read()
