@@ -516,6 +516,19 @@ def test_both_switchers_are_switchers():
     assert isinstance(Scheduled(()), Switcher)
 
 
+def test_only_numbers_of_a_graph_can_be_retuned(policies):
+    graph = GaitGraph.of(Condition(), flat="trot", rough="bound")
+    switcher = Autonomous(graph, 1)
+    switcher.retune(GaitGraph.of(Condition(alpha=0.1, beta=3.0), flat="trot", rough="bound"))
+    assert switcher.graph.edges[0].rule.beta == 3.0
+    for other in (
+        GaitGraph.of(Condition(), flat="trot", rough="pace"),
+        GaitGraph.of(Condition.paper(), flat="trot", rough="bound"),
+    ):
+        with pytest.raises(GaitshiftError, match="same edges and statistics"):
+            switcher.retune(other)
+
+
 def test_a_condition_of_other_numbers_is_another_condition(policies):
     driver = Driver(policies, 1, start="trot")
     switcher = Autonomous(GaitGraph.of(replace(CONDITION, beta=2.0), flat="trot", rough="bound"), 1)
