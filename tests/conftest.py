@@ -2,9 +2,12 @@
 
 import os
 
+import pytest
 from beartype import BeartypeConf, beartype
 from hypothesis import HealthCheck, settings
 from jaxtyping import install_import_hook
+
+import browsing
 
 check_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
 """beartype that takes an int for a float, as type checkers do (PEP 484)."""
@@ -19,3 +22,13 @@ if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("ci", settings.get_profile("here"), max_examples=50, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "here")
+
+
+@pytest.fixture
+def browser():
+    """The system's Chromium."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    with sync_api.sync_playwright() as play:
+        chromium = browsing.launched(play)
+        yield chromium
+        chromium.close()

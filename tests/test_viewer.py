@@ -1,7 +1,6 @@
 """Pages in the browser: the robots behind them, what is drawn, and the pages themselves."""
 
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -12,19 +11,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import browsing
 from gaitshift import gaits, policy
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import DemoConfig, run_demo
+from gaitshift.geometry import frames_of
 from gaitshift.log import Log
-from gaitshift.robot import ANYMAL_B
 from gaitshift.switching import load_condition
 from gaitshift.terrain import from_spec
 from gaitshift.viewer.charts import contact_svg, machine_svg
-from gaitshift.viewer.frame import WINDOW, Tape, frames_of
 from gaitshift.viewer.live import LiveConfig, LiveRun, with_amplitude
-from gaitshift.viewer.scene import ground_mesh, plane_corners
-from gaitshift.viewer.shape import Shape
+from gaitshift.viewer.tape import WINDOW, Tape
 
 TRACK = "flat@3,perlin:0.12@5,flat@2"
 
@@ -160,50 +158,6 @@ def test_only_noise_is_made_higher():
 # What is drawn ------------------------------------------------------------------------------------
 
 
-def test_bodies_stand_where_the_model_has_them():
-    """In its stance the robot's lowest points are its feet, a stance height below the base."""
-    shape = Shape(ANYMAL_B)
-    qpos = np.zeros((2, 19))
-    qpos[:, 2], qpos[:, 3], qpos[:, 7:] = ANYMAL_B.stance_height, 1.0, ANYMAL_B.stance_angles
-    qpos[1, :2] = 5.0, -3.0
-    position, rotation = shape.poses(qpos)
-    assert position.shape == (len(shape.bodies), 2, 3)
-    np.testing.assert_allclose(position[:, 1] - position[:, 0], np.tile([5.0, -3.0, 0.0], (13, 1)))
-    np.testing.assert_allclose(np.linalg.norm(rotation, axis=2), 1.0)
-    lowest = {}
-    for index, body in enumerate(shape.bodies):
-        w, x, y, z = rotation[index, 0]
-        up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
-        lowest[body.name] = float((body.mesh.vertices @ up).min() + position[index, 0, 2])
-    feet = [height for name, height in lowest.items() if "shank" in name]
-    assert feet == pytest.approx([0.0] * 4, abs=0.002)
-    assert min(height for name, height in lowest.items() if "shank" not in name) > 0.1
-
-
-def test_the_plane_goes_through_touches_that_lie_in_one():
-    rng = np.random.default_rng(0)
-    points = np.column_stack([rng.uniform(-0.4, 0.4, (4, 2)), np.zeros(4)])
-    points[:, 2] = 0.3 * points[:, 0] - 0.2 * points[:, 1] + 0.1
-    corners = plane_corners(points)
-    expected = 0.3 * corners[:, 0] - 0.2 * corners[:, 1] + 0.1
-    np.testing.assert_allclose(corners[:, 2], expected, atol=1e-9)
-
-
-def test_touches_on_one_line_give_a_plane_that_is_not_tilted_across_it():
-    points = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.1], [0.4, 0.0, 0.2], [0.6, 0.0, 0.3]])
-    corners = plane_corners(points)
-    np.testing.assert_allclose(corners[:, 2], corners[:, 0] / 2, atol=1e-9)
-
-
-def test_the_drawn_ground_is_the_ground():
-    ground = from_spec("flat@2,perlin:0.15@4", seed=1, length=1.0, width=3.0)
-    mesh = ground_mesh(ground)
-    np.testing.assert_allclose(mesh.vertices[:, 2], ground.height_at(mesh.vertices[:, :2]))
-    assert mesh.extents[:2] == pytest.approx([6.0, 3.0])
-    assert (mesh.face_normals[:, 2] > 0).all(), "it is seen from above"
-    assert len(mesh.vertices) < 6.0 * 3.0 / 0.07**2
-
-
 def test_a_tape_keeps_the_window_and_forgets_what_lies_ahead(policies):
     run, tape = LiveRun(LiveConfig(track="flat@40"), policies), Tape()
     frames = walk(run, WINDOW + 1.0)
@@ -273,9 +227,6 @@ def test_a_port_that_is_taken_is_named(capsys):
 
 # In a browser -------------------------------------------------------------------------------------
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
-
 
 def free_port():
     with socket.socket() as some:
@@ -307,23 +258,9 @@ def served(tmp_path):
         process.communicate()
 
 
-@pytest.fixture
-def browser():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    flags = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-    with sync_api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=flags)
-        yield browser
-        browser.close()
-
-
 def opened(browser, address):
     """A page on the address, and what went wrong on it."""
-    page, wrong = browser.new_page(viewport={"width": 1000, "height": 640}), []
-    page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
-    page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.set_default_timeout(90_000)
-    page.goto(address, wait_until="commit")
+    page, wrong = browsing.opened(browser, address)
     page.get_by_text("real time").first.wait_for()
     return page, wrong
 
@@ -343,7 +280,7 @@ def wait_until(true, seconds=60.0):
 
 
 @pytest.mark.slow
-@needs_browser
+@browsing.needed
 def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
     process, address = served("--track", "flat@200")
     page, wrong = opened(browser, address)

@@ -14,6 +14,7 @@ from gaitshift.cli.gaits import Gaits
 from gaitshift.cli.identify import Identify
 from gaitshift.cli.output import say
 from gaitshift.cli.record import Record
+from gaitshift.cli.report import Report
 from gaitshift.cli.reproduce import Reproduce
 from gaitshift.cli.study import Study
 from gaitshift.cli.train import Train
@@ -31,6 +32,7 @@ Command = (
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
     | Annotated[Study, tyro.conf.subcommand("study")]
     | Annotated[Transitions, tyro.conf.subcommand("transitions")]
+    | Annotated[Report, tyro.conf.subcommand("report")]
     | Annotated[View, tyro.conf.subcommand("view")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )

@@ -1,6 +1,8 @@
 """`gaitshift demo`: a robot that shifts its gait by itself, as a folder to look at."""
 
 import json
+import shlex
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +15,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import DemoConfig, run_demo
 from gaitshift.log import Log
 
-VIDEO, PICTURE, LOG, SUMMARY = "demo.mp4", "demo.png", "log.npz", "summary.json"
+PAGE, VIDEO, PICTURE = "index.html", "demo.mp4", "demo.png"
+LOG, SUMMARY = "log.npz", "summary.json"
 
 
 def _split(text: str) -> tuple[str, ...]:
@@ -54,7 +57,7 @@ class Demo(DemoConfig):
     """Times of the shifts to the second of these gaits and on [s], such as 2,5,8; else every
     `every` seconds."""
     out: Path = Path("gaitshift-demo")
-    """Folder for demo.mp4, demo.png, log.npz and summary.json."""
+    """Folder for index.html, demo.mp4, demo.png, log.npz and summary.json."""
     overwrite: bool = False
     """Replace these files in a folder that is not empty."""
     video: bool = True
@@ -66,7 +69,7 @@ class Demo(DemoConfig):
         """Runs, draws, and says where to look."""
         learned = self.controller == "policy"
         policies = {gait: policy.load(gait) for gait in self.used} if learned else {}
-        files = (VIDEO, PICTURE, LOG, SUMMARY)
+        files = (PAGE, VIDEO, PICTURE, LOG, SUMMARY)
         check_folder(self.out, overwrite=self.overwrite, ours=files)
         with progress("walking") as report:
             log, summaries = run_demo(self, policies, report)
@@ -78,6 +81,8 @@ class Demo(DemoConfig):
         written = [SUMMARY, PICTURE, LOG]
         if self.video and self._render(log):
             written.insert(0, VIDEO)
+        self._report(log)
+        written.insert(0, PAGE)
         if self.json:
             emit_json(summary)
             return
@@ -105,6 +110,13 @@ class Demo(DemoConfig):
         from gaitshift.plots import demo_figure  # matplotlib is slow to import
 
         demo_figure(log, self.out / PICTURE)
+
+    def _report(self, log: Log) -> None:
+        from gaitshift.report import write_report
+
+        video, command = self.out / VIDEO, shlex.join(["gaitshift", *sys.argv[1:]])
+        facts = {"command": command, "seed": str(self.seed)}
+        write_report(log, self.out / PAGE, video=video if self.video else None, facts=facts)
 
     def _render(self, log: Log) -> bool:
         from gaitshift.video import VideoUnavailable, render

@@ -10,7 +10,7 @@ import viser
 from gaitshift.legs import LEGS
 from gaitshift.plots.palette import INK, LEG_COLOURS, PALE, QUIET, gait_colours
 from gaitshift.reward_machine import RewardMachine
-from gaitshift.viewer.frame import WINDOW, Tape
+from gaitshift.viewer.tape import WINDOW, Tape
 
 _HEIGHT = 150
 """Of a chart [pixels]."""

@@ -7,13 +7,13 @@ import numpy as np
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import Recorder, RolloutConfig, Walk
+from gaitshift.geometry import Frame, last_touches
 from gaitshift.log import Log
 from gaitshift.policy import Policy
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import Robot
 from gaitshift.switching import Autonomous, Condition, Driver, GaitGraph
 from gaitshift.terrain import from_spec
-from gaitshift.viewer.frame import Frame, last_touches
 from gaitshift.world import World
 
 MOST_ROBOTS = 16

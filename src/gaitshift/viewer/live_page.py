@@ -11,12 +11,13 @@ import viser
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
+from gaitshift.geometry import Frame
 from gaitshift.switching import CONDITIONS, Condition
 from gaitshift.viewer.charts import Charts
-from gaitshift.viewer.frame import Frame, Tape
 from gaitshift.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, LiveRun, with_amplitude
 from gaitshift.viewer.scene import Scene
 from gaitshift.viewer.server import TICK, Clock
+from gaitshift.viewer.tape import Tape
 
 _CHARTS_EVERY = 6
 """Pictures between two of the charts."""

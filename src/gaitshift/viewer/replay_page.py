@@ -9,15 +9,16 @@ import viser
 from gaitshift import gaits
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
+from gaitshift.geometry import frames_of
 from gaitshift.log import Log
 from gaitshift.plots.signals import check_robot, ground_of
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot import ROBOTS
 from gaitshift.viewer.charts import Charts
-from gaitshift.viewer.frame import WINDOW, Tape, frames_of
 from gaitshift.viewer.live import MOST_ROBOTS
 from gaitshift.viewer.scene import Scene
 from gaitshift.viewer.server import TICK, Clock
+from gaitshift.viewer.tape import WINDOW, Tape
 
 _EVERY = round(TICK / CONTROL_PERIOD)
 """Entries of a log from picture to picture."""

@@ -8,26 +8,13 @@ import viser
 from jaxtyping import Float
 from PIL import ImageColor
 
+from gaitshift.geometry import Frame, Shape, ground_mesh, plane_corners
 from gaitshift.plots.palette import gait_colours
 from gaitshift.robot import Robot
 from gaitshift.terrain import Terrain
-from gaitshift.viewer.frame import Frame
-from gaitshift.viewer.shape import Shape, coloured
-
-_FINE = 0.08
-"""The ground is drawn with samples this far apart at the finest [m]."""
-
-_LOW, _MIDDLE, _HIGH = (np.array(c) for c in ((150, 136, 120), (205, 194, 178), (238, 233, 224)))
-"""Colours of the ground at its lowest, at level 0 and at its highest."""
-
-_CHECK = 1.0
-"""Edge of the squares on the ground, which show how fast a robot goes [m]."""
 
 _DARK = (70, 75, 82)
 """A foot that does not touch."""
-
-_PLANE = 0.55, 0.4
-"""Half of the length and width of the plane through the touches [m]."""
 
 _FOLLOW = 0.08
 """Share of the way to the robot that the camera goes in each frame."""
@@ -124,50 +111,3 @@ class Scene:
             lod="off",
             cast_shadow=False,
         )
-
-
-def plane_corners(points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
-    """Corners of a piece of the plane of least squares through points, about their middle [m]."""
-    middle = points.mean(axis=0)
-    offset = points - middle
-    slope = cast(Any, np.linalg).lstsq(offset[:, :2], offset[:, 2], rcond=1e-3)[0]
-    length, width = _PLANE
-    corners = np.array([[-length, -width], [length, -width], [length, width], [-length, width]])
-    return np.column_stack([corners, corners @ slope]) + middle
-
-
-def ground_mesh(ground: Terrain) -> trimesh.Trimesh:
-    """A ground as a mesh, coloured by height, with squares of a metre."""
-    (dx, dy), (x0, y0) = ground.cell, ground.origin
-    length, width = ground.size
-    fine = 0.25 if ground.is_flat else _FINE
-    columns = np.linspace(0.0, length, max(2, round(length / max(fine, dx)) + 1))
-    rows = np.linspace(0.0, width, max(2, round(width / max(fine, dy)) + 1))
-    x, y = np.meshgrid(x0 + columns, y0 + rows)
-    height = ground.height_at(np.stack([x, y], axis=-1))
-    i, j = np.meshgrid(np.arange(len(rows) - 1), np.arange(len(columns) - 1), indexing="ij")
-    corner = (i * len(columns) + j).ravel()
-    right, above = corner + 1, corner + len(columns)
-    faces = np.concatenate(
-        [
-            np.column_stack([corner, right, above + 1]),
-            np.column_stack([corner, above + 1, above]),
-        ]
-    )
-    mesh = trimesh.Trimesh(
-        vertices=np.column_stack([x.ravel(), y.ravel(), height.ravel()]), faces=faces, process=False
-    )
-    return coloured(mesh, _ground_colours(x.ravel(), y.ravel(), height.ravel()))
-
-
-def _ground_colours(
-    x: Float[np.ndarray, " V"], y: Float[np.ndarray, " V"], height: Float[np.ndarray, " V"]
-) -> np.ndarray:
-    reach = max(float(np.abs(height).max()), 0.05)
-    share = np.clip(height / reach, -1.0, 1.0)[:, None]
-    colour = np.where(
-        share < 0, _MIDDLE + share * (_MIDDLE - _LOW), _MIDDLE + share * (_HIGH - _MIDDLE)
-    )
-    is_dark = (np.floor(x / _CHECK) + np.floor(y / _CHECK)) % 2 == 0
-    colour = colour * np.where(is_dark, 0.94, 1.0)[:, None]
-    return np.column_stack([colour, np.full(len(colour), 255.0)]).astype(np.uint8)

@@ -1,7 +1,7 @@
-"""What a page shows at one instant, and over the last seconds."""
+"""What is to be seen of N robots at one instant."""
 
-from collections import deque
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 from gaitshift.log import Log
 from gaitshift.motion import rotation_of
 
-WINDOW = 8.0
-"""Charts show this much of the past [s]."""
+_PLANE = 0.55, 0.4
+"""Half of the length and width of the plane through the touches [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,32 +83,11 @@ def frames_of(log: Log, every: int) -> list[Frame]:
     return frames
 
 
-class Tape:
-    """The last seconds of one robot, for charts."""
-
-    def __init__(self, robot: int = 0) -> None:
-        self.robot = robot
-        self._frames: deque[Frame] = deque()
-
-    def add(self, frame: Frame) -> None:
-        """Takes in a frame; what is older than the window, or comes later, is let go."""
-        while self._frames and self._frames[-1].time >= frame.time:
-            self._frames.pop()  # the run began anew, or the slider was moved back
-        self._frames.append(frame)
-        while self._frames[0].time < frame.time - WINDOW:
-            self._frames.popleft()
-
-    def clear(self) -> None:
-        """Lets all of it go."""
-        self._frames.clear()
-
-    @property
-    def last(self) -> Frame | None:
-        """The newest frame."""
-        return self._frames[-1] if self._frames else None
-
-    def of(self, name: str) -> np.ndarray:
-        """A quantity of the robot over the window, time first; of `time` itself: [s]."""
-        if name == "time":
-            return np.array([frame.time for frame in self._frames])
-        return np.array([getattr(frame, name)[self.robot] for frame in self._frames])
+def plane_corners(points: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
+    """Corners of a piece of the plane of least squares through points, about their middle [m]."""
+    middle = points.mean(axis=0)
+    offset = points - middle
+    slope = cast(Any, np.linalg).lstsq(offset[:, :2], offset[:, 2], rcond=1e-3)[0]
+    length, width = _PLANE
+    corners = np.array([[-length, -width], [length, -width], [length, width], [-length, width]])
+    return np.column_stack([corners, corners @ slope]) + middle

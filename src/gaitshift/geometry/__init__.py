@@ -1,0 +1,10 @@
+"""What is to be seen in three dimensions: the robot's bodies, the ground, the last touches."""
+
+from gaitshift.geometry.frame import Frame as Frame
+from gaitshift.geometry.frame import frames_of as frames_of
+from gaitshift.geometry.frame import last_touches as last_touches
+from gaitshift.geometry.frame import plane_corners as plane_corners
+from gaitshift.geometry.ground import ground_grid as ground_grid
+from gaitshift.geometry.ground import ground_mesh as ground_mesh
+from gaitshift.geometry.shape import Body as Body
+from gaitshift.geometry.shape import Shape as Shape

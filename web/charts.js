@@ -1,0 +1,210 @@
+// Signals over time, each in a row of its own on one axis; hover to read, drag to go there, wheel to zoom.
+const LEFT = 58, RIGHT = 12, ROW = 92, BARS = 76, GAP = 30, AXIS = 34;
+
+export function charts(holder, data, seek) {
+  const canvas = document.createElement("canvas");
+  canvas.setAttribute("role", "img");
+  canvas.setAttribute("aria-label", data.rows.map((row) => row.title).join(", "));
+  const note = document.createElement("div");
+  note.className = "note";
+  holder.append(canvas, note);
+  const last = data.time[data.time.length - 1];
+  let span = [0, last], now = 0, hover = null;
+  const rows = data.rows;
+  const heights = rows.map((row) => (row.kind === "contacts" ? BARS : ROW));
+  const high = heights.reduce((sum, h) => sum + h + GAP, 0) + AXIS;
+  const index = (t) => Math.min(Math.max(Math.round(t / data.period) - 1, 0), data.time.length - 1);
+
+  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  /** A colour as it can be told from the paper: dark ones are lightened on dark paper. */
+  function shade(colour) {
+    if (colour === "ink") return style("--ink");
+    if (style("--dark") !== "1") return colour;
+    const parts = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
+    const light = (0.21 * parts[0] + 0.72 * parts[1] + 0.07 * parts[2]) / 255;
+    const mix = Math.max(0, 0.45 - light);
+    return `rgb(${parts.map((p) => Math.round(p + (255 - p) * mix)).join(" ")})`;
+  }
+
+  function draw() {
+    const wide = holder.clientWidth, ratio = Math.min(devicePixelRatio, 2);
+    canvas.width = wide * ratio;
+    canvas.height = high * ratio;
+    canvas.style.height = `${high}px`;
+    const pen = canvas.getContext("2d");
+    pen.scale(ratio, ratio);
+    pen.clearRect(0, 0, wide, high);
+    const ink = style("--ink"), quiet = style("--quiet"), pale = style("--pale");
+    const x = (t) => LEFT + ((t - span[0]) / (span[1] - span[0])) * (wide - LEFT - RIGHT);
+    pen.font = "12px system-ui, sans-serif";
+    let top = 0;
+    rows.forEach((row, r) => {
+      const height = heights[r], y0 = top + GAP - 8;
+      pen.fillStyle = ink;
+      pen.textAlign = "left";
+      pen.fillText(row.title, LEFT, top + 14);
+      legend(pen, row, wide, top + 14, quiet, LEFT + pen.measureText(row.title).width);
+      pen.save();
+      if (row.kind === "contacts") contacts(pen, row, x, y0, height, quiet, pale, wide);
+      else lines(pen, row, x, y0, height, quiet, pale, wide);
+      pen.restore();
+      top += height + GAP;
+    });
+    pen.fillStyle = quiet;
+    pen.textAlign = "center";
+    for (const t of ticks(span[0], span[1], wide / 90)) {
+      pen.fillText(`${+t.toFixed(3)}`, x(t), top + 12);
+      pen.fillRect(x(t), top - 6, 1, 4);
+    }
+    pen.fillText("time [s]", (LEFT + wide - RIGHT) / 2, top + 28);
+    for (const t of data.shifts) {
+      if (t < span[0] || t > span[1]) continue;
+      pen.fillStyle = quiet;
+      for (let y = 0; y < top - 8; y += 6) pen.fillRect(x(t), y, 1, 3);
+    }
+    pen.fillStyle = style("--accent");
+    if (now >= span[0] && now <= span[1]) pen.fillRect(x(now) - 0.75, 0, 1.5, top - 6);
+    if (hover !== null) {
+      pen.fillStyle = quiet;
+      pen.fillRect(x(hover), 0, 1, top - 6);
+    }
+    const i = index(hover ?? now);
+    note.textContent = [`${data.time[i].toFixed(2)} s`, data.gaits[data.gait[i]].title]
+      .concat(rows.filter((row) => row.kind === "lines").flatMap((row) =>
+        row.series.map((one) => `${one.name} ${one.values[i].toFixed(row.digits)}${row.unit && " " + row.unit}`)))
+      .join("  ·  ");
+  }
+
+  function legend(pen, row, wide, y, quiet, taken) {
+    if (row.kind !== "lines" || row.series.length < 2) return;
+    let x = wide - RIGHT;
+    const needs = row.series.reduce((sum, one) => sum + pen.measureText(one.name).width + 28, 0);
+    if (x - needs < taken) y += 16; // no room beside the title
+    pen.textAlign = "right";
+    for (const one of [...row.series].reverse()) {
+      pen.fillStyle = quiet;
+      pen.fillText(one.name, x, y);
+      x -= pen.measureText(one.name).width + 6;
+      pen.fillStyle = shade(one.colour);
+      pen.fillRect(x - 12, y - 5, 12, 3);
+      x -= 22;
+    }
+  }
+
+  function contacts(pen, row, x, y0, height, quiet, pale, wide) {
+    const each = height / 4;
+    row.names.forEach((name, leg) => {
+      const y = y0 + leg * each;
+      pen.fillStyle = quiet;
+      pen.textAlign = "right";
+      pen.fillText(name, LEFT - 8, y + each / 2 + 4);
+      pen.fillStyle = pale;
+      pen.fillRect(LEFT, y + 1, wide - LEFT - RIGHT, each - 2);
+    });
+    pen.beginPath();
+    pen.rect(LEFT, y0, wide - LEFT - RIGHT, height);
+    pen.clip();
+    const from = index(span[0]), to = index(span[1]);
+    for (let leg = 0; leg < 4; leg++)
+      for (let i = from; i <= to; i++) {
+        if (!((data.contact[i] >> leg) & 1)) continue;
+        let end = i;
+        while (end < to && (data.contact[end + 1] >> leg) & 1 && data.gait[end + 1] === data.gait[i]) end++;
+        pen.fillStyle = data.gaits[data.gait[i]].colour;
+        const left = x(data.time[i] - data.period);
+        pen.fillRect(left, y0 + leg * each + 1, Math.max(x(data.time[end]) - left, 0.6), each - 2);
+        i = end;
+      }
+  }
+
+  function lines(pen, row, x, y0, height, quiet, pale, wide) {
+    const from = index(span[0]), to = index(span[1]);
+    let low = Infinity, top = -Infinity;
+    for (const one of row.series)
+      for (let i = from; i <= to; i++)
+        if (Number.isFinite(one.values[i])) (low = Math.min(low, one.values[i])), (top = Math.max(top, one.values[i]));
+    if (!Number.isFinite(low)) return;
+    if (row.zero) low = Math.min(low, 0);
+    if (top - low < row.least) (top += row.least / 2), (low -= row.zero && low === 0 ? 0 : row.least / 2);
+    const y = (v) => y0 + height - ((v - low) / (top - low)) * height;
+    pen.textAlign = "right";
+    for (const v of ticks(low, top, 4)) {
+      pen.fillStyle = pale;
+      pen.fillRect(LEFT, y(v), wide - LEFT - RIGHT, 1);
+      pen.fillStyle = quiet;
+      pen.fillText(`${+v.toFixed(3)}`, LEFT - 8, y(v) + 4);
+    }
+    pen.beginPath();
+    pen.rect(LEFT, y0 - 2, wide - LEFT - RIGHT, height + 4);
+    pen.clip();
+    for (const one of row.series) {
+      pen.beginPath();
+      pen.strokeStyle = shade(one.colour);
+      pen.lineWidth = 1.4;
+      for (let i = from; i <= to; i++) {
+        const v = one.values[i];
+        if (!Number.isFinite(v)) continue;
+        pen.lineTo(x(data.time[i]), y(v));
+      }
+      if (one.fill) {
+        pen.lineTo(x(data.time[to]), y0 + height);
+        pen.lineTo(x(data.time[from]), y0 + height);
+        pen.fillStyle = shade(one.colour);
+        pen.fill();
+      } else pen.stroke();
+    }
+  }
+
+  const timeAt = (e) => {
+    const box = canvas.getBoundingClientRect();
+    const share = (e.clientX - box.left - LEFT) / (box.width - LEFT - RIGHT);
+    return Math.min(Math.max(span[0] + share * (span[1] - span[0]), span[0]), span[1]);
+  };
+  let drags = false;
+  canvas.addEventListener("pointerdown", (e) => ((drags = true), canvas.setPointerCapture(e.pointerId), seek(timeAt(e))));
+  canvas.addEventListener("pointermove", (e) => {
+    hover = timeAt(e);
+    if (drags) seek(hover);
+    else draw();
+  });
+  canvas.addEventListener("pointerup", () => (drags = false));
+  canvas.addEventListener("pointerleave", () => ((hover = null), draw()));
+  canvas.addEventListener("wheel", (e) => {
+    e.preventDefault();
+    const t = timeAt(e), factor = Math.exp(Math.max(-1, Math.min(1, e.deltaY / 200)));
+    const width = Math.min(Math.max((span[1] - span[0]) * factor, 0.5), last);
+    const share = (t - span[0]) / (span[1] - span[0]);
+    const begin = Math.min(Math.max(t - share * width, 0), last - width);
+    span = [begin, begin + width];
+    draw();
+  }, { passive: false });
+  canvas.addEventListener("dblclick", () => whole());
+  new ResizeObserver(draw).observe(holder);
+
+  function whole() {
+    span = [0, last];
+    draw();
+  }
+
+  function show(time) {
+    now = time;
+    const width = span[1] - span[0];
+    if (width < last && (time < span[0] || time > span[1])) {
+      const begin = Math.min(Math.max(time - width / 2, 0), last - width);
+      span = [begin, begin + width];
+    }
+    draw();
+  }
+
+  return { show, whole };
+}
+
+/** Round numbers between two, about so many. */
+function ticks(low, high, about) {
+  const raw = (high - low) / Math.max(about, 1), power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= raw);
+  const found = [];
+  for (let v = Math.ceil(low / step - 1e-9) * step; v <= high + 1e-9 * step; v += step) found.push(v);
+  return found;
+}
