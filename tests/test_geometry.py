@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gaitshift.geometry import Shape, ground_mesh, plane_corners
+from gaitshift.geometry import Shape, ground_mesh, linear, plane_corners
 from gaitshift.robot import ANYMAL_B
 from gaitshift.terrain import from_spec
 
@@ -50,3 +50,9 @@ def test_the_drawn_ground_is_the_ground():
     assert mesh.extents[:2] == pytest.approx([6.0, 3.0])
     assert (mesh.face_normals[:, 2] > 0).all(), "it is seen from above"
     assert len(mesh.vertices) < 6.0 * 3.0 / 0.07**2
+
+
+def test_colours_are_kept_as_linear_light():
+    """Half of the light is 188 of 255 in sRGB (IEC 61966-2-1)."""
+    kept = linear(np.array([[0, 188, 255]]))
+    np.testing.assert_allclose(kept, [[0, 128, 255]], atol=3)

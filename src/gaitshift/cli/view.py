@@ -77,4 +77,4 @@ class View:
 def _in_order(names: tuple[str, ...]) -> tuple[str, ...]:
     """The paper's gaits first."""
     first = ("trot", "bound", "pace")
-    return tuple(sorted(names, key=lambda name: (name not in first, name)))
+    return (*(n for n in first if n in names), *(n for n in names if n not in first))

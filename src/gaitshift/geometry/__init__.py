@@ -8,3 +8,4 @@ from gaitshift.geometry.ground import ground_grid as ground_grid
 from gaitshift.geometry.ground import ground_mesh as ground_mesh
 from gaitshift.geometry.shape import Body as Body
 from gaitshift.geometry.shape import Shape as Shape
+from gaitshift.geometry.shape import linear as linear

@@ -6,7 +6,7 @@ from typing import Any, cast
 import mujoco
 import numpy as np
 import trimesh
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Shaped, UInt8
 
 from gaitshift.robot import Robot
 
@@ -14,6 +14,9 @@ _VISUAL = 2
 """The model's group of shapes to look at."""
 
 _GEOM = mujoco.mjtGeom
+
+_GAMMA = 2.2
+"""Of sRGB, near enough."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,9 +83,18 @@ def _geom(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
 
 
 def coloured(mesh: trimesh.Trimesh, rgba: UInt8[np.ndarray, "V 4"]) -> trimesh.Trimesh:
-    """The mesh itself, with a colour at each vertex."""
-    mesh.visual = cast(Any, trimesh).visual.ColorVisuals(mesh, vertex_colors=rgba)
+    """The mesh itself, with a colour at each vertex, given as it is to look (sRGB).
+
+    Kept are linear values, which is what glTF and three.js take a vertex's colour for.
+    """
+    kept = np.column_stack([linear(rgba[:, :3]), rgba[:, 3]])
+    mesh.visual = cast(Any, trimesh).visual.ColorVisuals(mesh, vertex_colors=kept)
     return mesh
+
+
+def linear(rgb: Shaped[np.ndarray, "*colours 3"]) -> UInt8[np.ndarray, "*colours 3"]:
+    """Linear values, 0 to 255, of colours given as they are to look (sRGB), 0 to 255."""
+    return np.rint(255.0 * (rgb / 255.0) ** _GAMMA).astype(np.uint8)
 
 
 def _primitive(kind: int, size: Float[np.ndarray, " 3"]) -> trimesh.Trimesh:

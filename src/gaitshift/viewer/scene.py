@@ -8,7 +8,7 @@ import viser
 from jaxtyping import Float
 from PIL import ImageColor
 
-from gaitshift.geometry import Frame, Shape, ground_mesh, plane_corners
+from gaitshift.geometry import Frame, Shape, ground_mesh, linear, plane_corners
 from gaitshift.plots.palette import gait_colours
 from gaitshift.robot import Robot
 from gaitshift.terrain import Terrain
@@ -32,6 +32,7 @@ class Scene:
         )
         self._scene.set_up_direction("+z")
         self._scene.configure_default_lights(enabled=True, cast_shadow=True)
+        self._scene.configure_environment_map("park", environment_intensity=0.9)
         self._root = self._scene.add_frame("/world", show_axes=False)
         self._bodies: list[Any] = []
         self._feet: Any = None
@@ -83,7 +84,7 @@ class Scene:
         self._feet.batched_positions = feet.reshape(-1, 3).astype(np.float32)
         lit = self._palette[frame.gait][:, None, :]
         colours = np.where(frame.contact[..., None], lit, _DARK).reshape(-1, 3)
-        self._feet.batched_colors = colours.astype(np.uint8)
+        self._feet.batched_colors = linear(colours)
         self._draw_plane(frame.touch_w[0])
         if self.follows:
             base = frame.qpos[0, :3] * np.array([1.0, 1.0, 0.0])
