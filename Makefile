@@ -17,7 +17,7 @@ STUBS := typings/.made
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test check bench policies player clean
+.PHONY: help demo test check bench policies docs player clean
 
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -42,6 +42,9 @@ policies: $(DEV) ## train the shipped gaits anew, one after another, and put the
 	    $(BIN)/gaitshift train $$gait --seed $(SEED) --out runs/$$gait-$(SEED) --overwrite || exit 1; \
 	done
 	@$(BIN)/python tools/ship_policy.py $(GAITS:%=runs/%-$(SEED))
+
+docs: $(DEV) ## the documentation as a site: out/site/index.html
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo out/site/index.html
 
 player: ## bundle the player of reports with three.js (needs npm); its result is committed
 	@cd web && npm ci --silent --no-audit --no-fund && npm run --silent build

@@ -1,0 +1,64 @@
+"""The documentation: every block of code and every command in it is run, and the site is built."""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gaitshift.cli import main
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / "docs" / "index.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
+BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monkeypatch, capsys):
+    """Files are written, code is executed, commands are run; a training ends after 2 iterations."""
+    monkeypatch.chdir(tmp_path)
+    names, ran = {}, 0
+    for kind, title, text in BLOCK.findall(page.read_text(encoding="utf-8")):
+        if title:
+            (tmp_path / title).write_text(text, encoding="utf-8")
+        elif kind == "python":
+            exec(text, names)
+        elif kind == "console":
+            for line in text.splitlines():
+                assert line.startswith("$ gaitshift "), line
+                arguments = shlex.split(line)[2:]
+                if arguments[0] == "train":
+                    arguments += ["--iterations", "2"]
+                main(arguments)
+        else:
+            pytest.fail(f"a block of {kind} is neither run nor written")
+        ran += 1
+    assert ran >= 3
+    if page.stem == "own-controller":
+        assert "bound" in capsys.readouterr().out.split()
+    if page.stem == "tune":
+        assert "shift at 1.7" in capsys.readouterr().out, (
+            "four of six pairs differ"
+        )
+
+
+def test_every_page_of_the_documentation_is_in_the_sites_menu():
+    menu = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    assert {page for page in pages if page not in menu} == set()
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning(tmp_path):
+    if shutil.which("mkdocs", path=Path(sys.executable).parent) is None:
+        pytest.skip("mkdocs is not installed")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    reference = (tmp_path / "reference.html").read_text(encoding="utf-8")
+    for name in ("Condition", "TouchdownSurprise", "RewardMachine", "Recording", "GaitEnv"):
+        assert f">{name}<" in reference or f'{name}"' in reference, name
