@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
-PYTEST_ARGS ?=
+PYTEST_ARGS ?= -n 2
 GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
 

@@ -17,7 +17,7 @@ def opened(browser, address, **context):
     wrong = []
     page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.set_default_timeout(90_000)
+    page.set_default_timeout(200_000)
     page.goto(address, wait_until="commit")
     return page, wrong
 

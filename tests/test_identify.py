@@ -135,6 +135,21 @@ def test_the_way_back_notices_that_rough_ground_has_ended():
     assert judged.courses[0].tally.fired[0, 0] == 0
 
 
+def test_on_the_way_back_an_oracle_notices_the_very_step_in_which_rough_ground_ends():
+    ahead = march("out-of", noise=0.04, seed=2)
+    turned = {
+        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
+    }
+
+    def out():
+        return [replace(ahead, **turned)]
+
+    tuned = tune([c for c in CANDIDATES if c.name == "oracle"], out, way="flat")
+    (judged,) = judge(tuned, out)
+    assert judged.courses[0].tally.fired[0, 0] == 0
+    assert judged.courses[0].delays_m == pytest.approx([0.0] * 3)
+
+
 def test_a_condition_whose_signals_are_missing_is_left_out():
     slip = [c for c in CANDIDATES if c.name in ("slip", "height_difference")]
     assert [t.candidate.name for t in tune(slip, ways, way="rough")] == ["height_difference"]

@@ -272,7 +272,7 @@ def status(page):
     return gait, float(way.removesuffix(" m")), float(clock.removesuffix(" s"))
 
 
-def wait_until(true, seconds=60.0):
+def wait_until(true, seconds=150.0):
     end = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end, "it did not come about"

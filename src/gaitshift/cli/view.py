@@ -65,13 +65,27 @@ class View:
             if isinstance(shown, Log):
                 page = ReplayPage(server, shown)
             else:
-                page = LivePage(server, shown, self.out)
+                page = LivePage(server, shown, self._save)
             print(f"open http://{self.host}:{self.port} (Ctrl-C ends)", flush=True)
             page.run()
         except KeyboardInterrupt:
             say("gaitshift: the page is closed")
         finally:
             close(server)
+
+    def _save(self, log: Log) -> str:
+        """Keeps a recording as a log and as a page; older ones stay."""
+        from gaitshift.report import write_report  # matplotlib is slow to import
+
+        self.out.mkdir(parents=True, exist_ok=True)
+        number = 1
+        while (self.out / f"log-{number}.npz").exists():
+            number += 1
+        path, page = self.out / f"log-{number}.npz", self.out / f"run-{number}.html"
+        log.save(path)
+        write_report(log, page)
+        say(f"recorded {path} and {page}")
+        return f"{page} opens from disk; gaitshift view {path} plays it"
 
 
 def _in_order(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -113,7 +113,7 @@ def tune(
         for candidate in candidates:
             if not candidate.is_fed_by(seen):
                 continue
-            values = candidate.values(seen)
+            values = candidate.values(recording)  # an oracle sees the ground as it is
             grid = Grid(alphas=candidate.alphas, betas=BETAS)
             for leak in candidate.leaks:
                 rule = _rule(way, 1.0, 1.0, leak)
@@ -175,7 +175,7 @@ def judge(
                     f"{seen.name} lacks signals of '{one.candidate.name}' that other logs have"
                 )
             alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
-            values = one.candidate.values(seen)
+            values = one.candidate.values(recording)
             first = first_firings(values, seen.alive, one.rule, alpha, beta)
             kept = courses[one.candidate.name]
             course = kept.setdefault(

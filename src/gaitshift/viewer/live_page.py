@@ -4,7 +4,6 @@ import math
 import queue
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any, cast
 
 import viser
@@ -12,6 +11,7 @@ import viser
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
 from gaitshift.geometry import Frame
+from gaitshift.log import Log
 from gaitshift.switching import CONDITIONS, Condition
 from gaitshift.viewer.charts import Charts
 from gaitshift.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, LiveRun, with_amplitude
@@ -36,10 +36,10 @@ class LivePage:
         self,
         server: viser.ViserServer,
         live: LiveRun,
-        out: Path,
+        save: Callable[[Log], str],
     ) -> None:
-        """Recordings go into the folder `out`."""
-        self._server, self._out = server, out
+        """`save` keeps a recording, and says in a line where it is."""
+        self._server, self._save = server, save
         self._live = live
         self._scene = Scene(server, live.robot, live.gaits)
         self._tape = Tape()
@@ -268,10 +268,7 @@ class LivePage:
         self._record.label = "record"
         if log is None:
             return
-        self._out.mkdir(parents=True, exist_ok=True)
-        path = self._out / "log.npz"
-        log.save(path)
-        self._notify("recorded", f"{path}: gaitshift view {path} shows it again", "green")
+        self._notify("recorded", self._save(log), "green")
 
     def _notify(self, title: str, body: str, colour: str) -> None:
         for client in self._server.get_clients().values():
