@@ -41,9 +41,7 @@ def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monk
     if page.stem == "own-controller":
         assert "bound" in capsys.readouterr().out.split()
     if page.stem == "tune":
-        assert "shift at 1.7" in capsys.readouterr().out, (
-            "four of six pairs differ"
-        )
+        assert "shift at 1.7" in capsys.readouterr().out, "four of six pairs differ"
 
 
 def test_every_page_of_the_documentation_is_in_the_sites_menu():

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from gaitshift import policy
 from gaitshift.cli import main
 from gaitshift.evaluation import DemoConfig, run_demo
 from gaitshift.plots.crossings import crossings_figure
-from gaitshift.studies.crossing import cross, measure_crossings, ways
-from gaitshift.studies.crossing_table import COLUMNS, mean_of
+from gaitshift.studies.crossing import Crossings, cross, measure_crossings, ways
+from gaitshift.studies.crossing_table import COLUMNS, mean_of, row_of
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 BOTH = {"trot": TROT, "bound": BOUND}
@@ -87,6 +87,14 @@ def test_intervals_of_means_are_scipys():
     assert mean == pytest.approx(values.mean(), abs=1e-4)
     assert half == pytest.approx((high - low) / 2, rel=1e-3)
     assert mean_of(values[:1]) == ("", "")
+
+
+def test_more_shifts_than_there_and_back_are_chatter(log):
+    out = measure_crossings(log, 3.0)
+    four = {f.name: np.resize(getattr(out, f.name), 4) for f in fields(out)}
+    way = ways("trot", "bound", ())[0]
+    row = row_of(way, 0.1, 0, Crossings(**four | {"shifts": np.array([2, 3, 0, 5])}))
+    assert (row["chattered"], row["shifts"], row["runs"]) == (2, 2.5, 4)
 
 
 def test_only_the_oracle_shifts_where_the_noise_is_seen():

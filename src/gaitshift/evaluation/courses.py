@@ -11,6 +11,10 @@ from gaitshift.policy import Policy
 AMPLITUDES = (0.05, 0.07, 0.10, 0.15, 0.20)
 """Of the noise that robots walk into, and out of [m]."""
 
+_UNTIL = (10.0, 18.0, 12.0, 16.0, 14.0)
+"""Where the noise ends that robots walk out of, amplitude by amplitude [m]: were it always the same
+place, a clock would notice it best."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
@@ -43,10 +47,13 @@ COURSES = (
         Course(name=f"into-{a:.2f}", terrain=f"flat@6,perlin:{a:.2f}@10,flat@18")
         for a in AMPLITUDES
     ),
-    *(Course(name=f"out-of-{a:.2f}", terrain=f"perlin:{a:.2f}@12,flat@22") for a in AMPLITUDES),
+    *(
+        Course(name=f"out-of-{a:.2f}", terrain=f"perlin:{a:.2f}@{end:g},flat@22")
+        for a, end in zip(AMPLITUDES, _UNTIL, strict=True)
+    ),
 )
 """Ours: one edge every 6 m, ten stairs up and down every 9 m, noise of 10 m between level ground,
-and noise from the start that ends after 10 m."""
+and noise from the start that ends after 8 to 16 m."""
 
 
 def select(names: tuple[str, ...]) -> tuple[Course, ...]:

@@ -26,11 +26,15 @@ COLUMNS: dict[str, type] = {
     "cost_of_transport": float,
     "cost_half": float,
     "shifts": float,
+    "chattered": int,
 }
 """`low` and `high` are Wilson's interval of the share that survived, `…_half` half the width of the
 interval of a mean (95 % both)."""
 
 PICTURE = "crossings.png"
+
+ENOUGH = 2
+"""Shifts that one stretch of noise is worth; more are chatter."""
 
 
 def row_of(way: Way, amplitude: float, seed: int, crossings: Crossings) -> Row:
@@ -53,6 +57,7 @@ def row_of(way: Way, amplitude: float, seed: int, crossings: Crossings) -> Row:
         "high": round(float(high[0]), 5),
         "arrived": int(crossings.arrived.sum()),
         "shifts": round(float(crossings.shifts.mean()), 2),
+        "chattered": int((crossings.shifts > ENOUGH).sum()),
     }
     for name, (values, half) in means.items():
         row[name], row[half] = mean_of(values)
@@ -84,6 +89,7 @@ def page(rows: Sequence[Row], command: str) -> str:
         "speed [m/s]",
         "CoT",
         "shifts",
+        "chattered",
     )
     parts = [
         "# Does the shift help?",
@@ -92,8 +98,9 @@ def page(rows: Sequence[Row], command: str) -> str:
         "by an oracle that sees where the noise is. The fields and the starts are the same for "
         "all. Survived: did not fall before the finish. Arrived: was there within "
         f"{PATIENCE:g} times the time that the command takes. Distance and speed are of all "
-        "robots, until they fell too; CoT of those that came a metre or more. Intervals are of "
-        "95 %, those of shares Wilson's.",
+        "robots, until they fell too; CoT of those that came a metre or more. Chattered: shifted "
+        f"more than {ENOUGH} times, which is once there and once back. Intervals are of 95 %, "
+        "those of shares Wilson's.",
         f"Made by `{command}`.",
         f"![Survival, distance, speed and cost of transport over the amplitude]({PICTURE})",
     ]
@@ -120,4 +127,5 @@ def _cells(row: Row) -> tuple[str, ...]:
         mean("speed_m_s", "speed_half"),
         mean("cost_of_transport", "cost_half"),
         f"{row['shifts']:.1f}",
+        str(row["chattered"]),
     )
