@@ -90,14 +90,14 @@ def arrays_in(state):
 def test_robots_one_by_one_are_the_batch_bit_for_bit(kind):
     rng, statistic = np.random.default_rng(3), STATISTICS[kind]()
     batch, singles = statistic.start(5), [statistic.start(1) for _ in range(5)]
-    for step in range(420):
+    for step in range(700):
         signals = random_signals(rng, 5, step)
         batch, values = statistic.step(batch, signals)
         assert values.shape == (5, statistic.width)
         for robot in range(5):
             singles[robot], alone = statistic.step(singles[robot], signals.of(np.array([robot])))
             np.testing.assert_array_equal(alone[0], values[robot])
-    assert not np.isnan(values).any(), "four seconds are enough for all"
+    assert not np.isnan(values).any(), "seven seconds are enough for all"
 
 
 @pytest.mark.parametrize("kind", STATISTICS)
@@ -293,16 +293,26 @@ def test_a_step_surprises_the_feet_that_lead_by_its_height_and_then_no_more(spee
             **walk,
         )
         first = np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]
-        assert seen[first] == pytest.approx(abs(rise), abs=0.002), "the first foot on it"
+        expected = abs(rise) / math.sqrt(2.0)
+        assert seen[first] == pytest.approx(expected, abs=0.002), "the first foot on it"
         assert np.isfinite(seen[first - 1]), "level ground before, and it was seen"
         assert seen[-1] < 0.002, "level ground behind"
 
 
-def test_surprises_are_averaged_by_their_squares():
-    """Of four touchdowns one is met 6 cm too high: √(0.06² / 4) = 3 cm, just then."""
+def test_changes_of_surprise_are_averaged_by_their_squares():
+    """Of three changes one is of 6 cm: √(0.06² / 3 / 2) = 2.45 cm, just then."""
     walk = {"turn": 0.0, "wobble": 0.0}
-    seen = course(TouchdownSurprise(memory=4), lambda x, y: 0.06 * (x > 2.0), **walk)
-    assert seen[np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]] == pytest.approx(0.03, abs=0.001)
+    seen = course(TouchdownSurprise(memory=3), lambda x, y: 0.06 * (x > 2.0), **walk)
+    assert seen[np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]] == pytest.approx(0.0245, abs=0.001)
+
+
+def test_where_a_slope_begins_touches_surprise_less_than_a_step_of_its_rise_in_a_stride():
+    walk = {"turn": 0.0, "wobble": 0.0, "seconds": 6.0}
+    rise = math.tan(math.radians(10.0))
+    bend = course(TouchdownSurprise(), lambda x, y: rise * np.maximum(x - 2.0, 0.0), **walk)
+    step = course(TouchdownSurprise(), lambda x, y: 0.1 * (x > 2.0), **walk)
+    assert np.nanmax(bend) < 0.7 * np.nanmax(step)
+    assert np.nan_to_num(bend)[-50:].max() < 0.002, "a slope by itself is no surprise"
 
 
 def test_a_foot_that_bounces_has_touched_once():

@@ -105,7 +105,7 @@ CANDIDATES = (
         "touchdown_surprise",
         low=0.005,
         high=0.1,
-        note="new touches against the plane of the earlier ones",
+        note="how new touches change about the plane of the earlier ones",
     ),
     _watching(
         AttitudeVariance(),

@@ -27,22 +27,24 @@ class SurpriseState:
     touches: TouchState
     """The touches of all feet."""
     error: Float[np.ndarray, "N J"]
-    """The last errors, the last first [m]; NaN before that."""
+    """The last errors, the last first [m]; NaN before that: one more than the changes."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TouchdownSurprise:
-    """Root mean square of the last touchdowns' errors against a plane, along the vertical [m].
+    """Root mean square of the changes of the last touchdowns' errors over √2 [m].
 
     Each foot that comes down on new ground, ahead of all earlier touches, is held against the plane
-    through those: a slope is no surprise, a single step is one for a stride, noise is one at each
-    touchdown. Feet that come down where others stood before say nothing new, and do not count.
+    through those, along the vertical: that is its error. A slope has none; where it begins errors
+    grow and fade, and from one touchdown to the next they change little; a single step changes them
+    once; noise changes them at each touchdown, by √2 times the error's own deviation (von Neumann
+    1941). Feet that come down where others stood before say nothing new, and do not count.
     """
 
     touches: int = 3
     """Touches of each foot that the plane goes through."""
-    memory: int = 4
-    """Touchdowns that the mean is over."""
+    memory: int = 3
+    """Changes that the mean is over."""
     least_swing: float = 0.05
     """A foot that comes down again sooner has bounced: it is the same touch [s]."""
 
@@ -53,7 +55,7 @@ class TouchdownSurprise:
     def __post_init__(self) -> None:
         _ = self._memory
         if not 1 <= self.memory <= 1000:
-            raise GaitshiftError(f"memory = {self.memory}: 1 to 1000 touchdowns would be right")
+            raise GaitshiftError(f"memory = {self.memory}: 1 to 1000 changes would be right")
 
     @cached_property
     def _memory(self) -> Touches:
@@ -61,22 +63,24 @@ class TouchdownSurprise:
 
     def start(self, n: int) -> SurpriseState:
         """State of n robots of which no foot has touched."""
-        return SurpriseState(touches=self._memory.start(n), error=np.full((n, self.memory), np.nan))
+        nothing = np.full((n, self.memory + 1), np.nan)
+        return SurpriseState(touches=self._memory.start(n), error=nothing)
 
     def step(
         self, state: SurpriseState, signals: Signals
     ) -> tuple[SurpriseState, Float[np.ndarray, "N 1"]]:
-        """Errors after this step, and their root mean square; NaN before the first."""
+        """Errors after this step, and what their changes come to; NaN before the first."""
         touches, new, foot = self._memory.step(state.touches, signals)
         error = state.error
         ids = np.flatnonzero(new.any(axis=1))
         if ids.size:
             error = error.copy()
             error[ids] = self._take_in(error[ids], state.touches, touches, new, foot, ids)
-        known = ~np.isnan(error)
+        change = np.diff(error, axis=1)
+        known = ~np.isnan(change)
         count = known.sum(axis=1)
-        square = np.where(known, error * error, 0.0).sum(axis=1)
-        mean = np.where(count > 0, np.sqrt(square / np.maximum(count, 1)), np.nan)
+        square = np.where(known, change * change, 0.0).sum(axis=1)
+        mean = np.where(count > 0, np.sqrt(square / (2.0 * np.maximum(count, 1))), np.nan)
         return SurpriseState(touches=touches, error=error), mean[:, None]
 
     def _take_in(
