@@ -18,8 +18,11 @@ from gaitshift.identification.finding import Judged, Tuned
 from gaitshift.plots.palette import GROUND, INK, PALE, PAPER, QUIET
 from gaitshift.plots.style import check_target, house_style, save
 
-_LINES = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#7b4ea3", "#8c6d46")
-"""After Okabe and Ito, as the gaits'; conditions are not gaits, and no figure shows both."""
+_LINES = (
+    *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"),
+    *("#7b4ea3", "#8c6d46", "#44aa99", "#882255", "#1f2933"),
+)
+"""After Okabe and Ito, and Tol; conditions are not gaits, and no figure shows both."""
 
 _LATEST = 6.0
 """Delays are shaded up to here [m]."""
