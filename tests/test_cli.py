@@ -140,7 +140,12 @@ def test_the_demo_writes_what_it_says(capsys: pytest.CaptureFixture[str], tmp_pa
     out = tmp_path / "demo"
     main(["demo", "--track", "flat@2,flat@2", "--no-video", "--out", str(out)])
     printed = capsys.readouterr().out
-    assert {path.name for path in out.iterdir()} == {"demo.png", "log.npz", "summary.json"}
+    assert {path.name for path in out.iterdir()} == {
+        "index.html",
+        "demo.png",
+        "log.npz",
+        "summary.json",
+    }
     assert str(out) in printed
     summary = json.loads((out / "summary.json").read_text())
     assert summary["survived"] is True
