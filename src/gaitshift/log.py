@@ -70,15 +70,17 @@ class Log:
 
     def part(self, entries: slice) -> "Log":
         """The same robots in some of the entries; arrays are shared."""
-        courses = (f.name for f in fields(self) if not f.name.startswith(_TIMELESS))
-        given = ((name, getattr(self, name)) for name in courses)
-        return replace(self, **{name: rows[entries] for name, rows in given if rows is not None})
+        return replace(self, time=self.time[entries], **self._courses((entries,)))
 
     def robots(self, ids: slice) -> "Log":
         """Some of the robots over the whole time; arrays are shared."""
-        courses = (f.name for f in fields(self) if not f.name.startswith((*_TIMELESS, "time")))
-        given = ((name, getattr(self, name)) for name in courses)
-        return replace(self, **{name: rows[:, ids] for name, rows in given if rows is not None})
+        return replace(self, **self._courses((slice(None), ids)))
+
+    def _courses(self, where: tuple[slice, ...]) -> dict[str, Any]:
+        """All arrays over time and robots, there."""
+        names = (f.name for f in fields(self) if not f.name.startswith((*_TIMELESS, "time")))
+        given = ((name, getattr(self, name)) for name in names)
+        return {name: rows[where] for name, rows in given if rows is not None}
 
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""

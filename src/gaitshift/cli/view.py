@@ -9,6 +9,7 @@ import tyro
 from gaitshift import policy as policies
 from gaitshift.cli.output import say
 from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import DemoConfig
 from gaitshift.log import Log
 from gaitshift.switching import load_condition
 
@@ -24,7 +25,7 @@ class View:
 
     log: Annotated[Path | None, tyro.conf.Positional] = None
     """A log of `demo`, `evaluate`, `record` or of this page; without one robots walk live."""
-    track: str = "flat@8,perlin:0.10@12,flat@10"
+    track: str = DemoConfig.track
     """The ground, piece by piece with lengths in metres."""
     robots: int = 1
     """Robots on the track, 1 to 16; charts tell of the first."""

@@ -5,7 +5,6 @@ from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Float, Shaped
-from PIL import ImageColor
 
 from gaitshift import gaits
 from gaitshift.geometry import Shape, frames_of, ground_grid, plane_corners
@@ -143,8 +142,6 @@ def _lines(
 def _series(
     name: str, values: Shaped[np.ndarray, " T"], colour: str, *, fill: bool = False
 ) -> dict[str, Any]:
-    if colour != "ink":
-        _ = ImageColor.getrgb(colour)
     return {"name": name, "values": _packed(values, "f4"), "colour": colour, "fill": fill}
 
 

@@ -1,11 +1,12 @@
 """Robots that walk now, and take orders between two steps."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation.demo import RUN_OUT, START, WIDTH, DemoConfig
 from gaitshift.evaluation.rollout import Recorder, RolloutConfig, Walk
 from gaitshift.geometry import Frame, last_touches
 from gaitshift.log import Log
@@ -19,9 +20,6 @@ from gaitshift.world import World
 MOST_ROBOTS = 16
 """Robots that a page shows at most."""
 
-START, RUN_OUT, WIDTH = 1.5, 8.0, 8.0
-"""Where robots start along the track, level ground behind its end, its width [m]."""
-
 PUSH_TIME = 0.2
 """How long a push lasts [s]."""
 
@@ -33,7 +31,7 @@ LYING = 2.0
 class LiveConfig:
     """What walks, on what, and by which rule."""
 
-    track: str = "flat@8,perlin:0.10@12,flat@10"
+    track: str = DemoConfig.track
     """Spec of the ground."""
     robots: int = 1
     """The first is the one that charts tell of; the others are its ghosts."""
@@ -213,10 +211,8 @@ class LiveRun:
 
     @staticmethod
     def _rollout(config: LiveConfig) -> RolloutConfig:
-        return replace(
-            RolloutConfig(seconds=1.0),
-            speed=config.speed,
-            stride_frequency=config.stride_frequency,
+        return RolloutConfig(
+            seconds=np.inf, speed=config.speed, stride_frequency=config.stride_frequency
         )
 
 
