@@ -132,7 +132,7 @@ def _video(path: Path | None) -> str:
         return ""
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     return (
-        "<h2>Film</h2><video controls muted playsinline preload='metadata' "
+        "<h2>Film</h2><video controls muted playsinline preload='auto' "
         f"src='data:video/mp4;base64,{data}'></video>"
     )
 
