@@ -66,7 +66,7 @@ $(BASE): pyproject.toml | $(BIN)/python
 $(DEV): pyproject.toml constraints.txt | $(BIN)/python
 	@echo 'installing gaitshift with training and tools into $(VENV) (once, some minutes)'
 	@$(PIP) install --constraint constraints.txt torch
-	@$(PIP) install --constraint constraints.txt --editable '.[train,identify,view,dev]'
+	@$(PIP) install --constraint constraints.txt --editable '.[train,identify,view,meshes,dev]'
 	@touch $(BASE) $@
 
 $(STUBS): $(DEV)

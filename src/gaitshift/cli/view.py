@@ -11,6 +11,7 @@ from gaitshift.cli.output import say
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import DemoConfig
 from gaitshift.log import Log
+from gaitshift.robot import ANYMAL_B
 from gaitshift.switching import load_condition
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -43,11 +44,14 @@ class View:
     def run(self) -> None:
         """Opens the page, and keeps it until Ctrl-C."""
         try:
+            from gaitshift.geometry import has_meshes
             from gaitshift.viewer import LiveConfig, LivePage, LiveRun, ReplayPage, close, serve
         except ImportError as error:
             raise GaitshiftError(
                 f"view needs the package '{error.name}'; install gaitshift[view]"
             ) from error
+        if not has_meshes(ANYMAL_B):
+            say("drawn with simple shapes; gaitshift[meshes] brings ANYmal's own (130 MB)")
         config = LiveConfig(
             track=self.track,
             robots=self.robots,

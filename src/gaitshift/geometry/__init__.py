@@ -6,6 +6,8 @@ from gaitshift.geometry.frame import last_touches as last_touches
 from gaitshift.geometry.frame import plane_corners as plane_corners
 from gaitshift.geometry.ground import ground_grid as ground_grid
 from gaitshift.geometry.ground import ground_mesh as ground_mesh
+from gaitshift.geometry.meshes import has_meshes as has_meshes
+from gaitshift.geometry.meshes import put_on as put_on
 from gaitshift.geometry.shape import Body as Body
 from gaitshift.geometry.shape import Shape as Shape
 from gaitshift.geometry.shape import linear as linear

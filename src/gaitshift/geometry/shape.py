@@ -8,10 +8,8 @@ import numpy as np
 import trimesh
 from jaxtyping import Float, Shaped, UInt8
 
+from gaitshift.geometry.meshes import VISUAL, put_on
 from gaitshift.robot import Robot
-
-_VISUAL = 2
-"""The model's group of shapes to look at."""
 
 _GEOM = mujoco.mjtGeom
 
@@ -35,7 +33,9 @@ class Shape:
     """A robot's bodies, and their poses for any `qpos`."""
 
     def __init__(self, robot: Robot) -> None:
-        self._model = robot.spec(robot.gains_of("default")).compile()
+        spec = robot.spec(robot.gains_of("default"))
+        put_on(spec, robot)
+        self._model = spec.compile()
         self._data = mujoco.MjData(self._model)
         self.bodies = tuple(
             Body(name=self._model.body(index).name, index=index, mesh=mesh)
@@ -63,14 +63,18 @@ def _mesh_of(model: mujoco.MjModel, body: int) -> trimesh.Trimesh | None:
     parts = [
         _geom(model, geom)
         for geom in range(first, first + count)
-        if model.geom_group[geom] == _VISUAL
+        if model.geom_group[geom] == VISUAL
     ]
     return cast(Any, trimesh.util).concatenate(parts) if parts else None
 
 
 def _geom(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
-    """One primitive in its body's frame."""
-    mesh = _primitive(int(model.geom_type[geom]), model.geom_size[geom])
+    """One shape in its body's frame."""
+    kind = int(model.geom_type[geom])
+    if kind == _GEOM.mjGEOM_MESH:
+        mesh = _surface(model, int(model.geom_dataid[geom]))
+    else:
+        mesh = _primitive(kind, model.geom_size[geom])
     pose = np.eye(4)
     turned = np.zeros(9)
     mujoco.mju_quat2Mat(turned, model.geom_quat[geom])
@@ -80,6 +84,15 @@ def _geom(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
     rgba = model.geom_rgba[geom] if material < 0 else model.mat_rgba[material]
     colour = np.rint(255 * np.asarray(rgba)).astype(np.uint8)
     return coloured(mesh, np.tile(colour, (len(mesh.vertices), 1)))
+
+
+def _surface(model: mujoco.MjModel, mesh: int) -> trimesh.Trimesh:
+    """A mesh of the model, in its geom's frame."""
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    return trimesh.Trimesh(
+        model.mesh_vert[first : first + count], model.mesh_face[face : face + faces], process=False
+    )
 
 
 def coloured(mesh: trimesh.Trimesh, rgba: UInt8[np.ndarray, "V 4"]) -> trimesh.Trimesh:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift.geometry import put_on
 from gaitshift.robot import Robot
 from gaitshift.terrain import Terrain, to_unit_interval
 
@@ -51,6 +52,7 @@ def build_stage(
     """The stage for a robot that walks along `course` (x, y) [m], for pictures of this size."""
     seen = _around(terrain, course)
     spec = robot.spec(robot.gains_of("default"))
+    put_on(spec, robot)
     _set_look(spec, width, height)
     field = to_unit_interval(seen)
     rows, columns = _texture_shape(seen)
