@@ -132,7 +132,7 @@ def _convert(urdf: Path) -> list[Part]:
         body = f"{_LEGS[leg]}_{name.lower()}" if name else leg
         file = urdf.parents[2] / mesh.attrib["filename"].partition("/robots/")[2]
         roll, pitch, yaw = (float(value) for value in origin.attrib["rpy"].split())
-        pose = trimesh.transformations.euler_matrix(roll, pitch, yaw)
+        pose = cast(Any, trimesh.transformations).euler_matrix(roll, pitch, yaw)
         pose[:3, 3] = [float(value) for value in origin.attrib["xyz"].split()]
         for colour, surface in _surfaces(file).items():
             moved = surface.copy()
