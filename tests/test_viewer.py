@@ -20,7 +20,7 @@ from gaitshift.geometry import frames_of
 from gaitshift.log import Log
 from gaitshift.switching import load_condition
 from gaitshift.terrain import from_spec
-from gaitshift.viewer.charts import contact_svg, machine_svg
+from gaitshift.viewer.charts import contact_svg, counter, machine_svg
 from gaitshift.viewer.live import LiveConfig, LiveRun, with_amplitude
 from gaitshift.viewer.tape import WINDOW, Tape
 
@@ -191,6 +191,17 @@ def test_the_present_state_of_the_machine_is_lit(name):
         (lit,) = re.findall(r'fill="#123456".*?>([A-Z a-z]+)</text>', svg)
         assert set(lit.split()) == (set(one.stance) or {"no", "foot"})
         assert svg.count("<g>") == len(machine.states)
+
+
+def test_the_chart_of_k_marks_shifts_where_they_are_and_nowhere_else(policies):
+    run, tape = LiveRun(LiveConfig(track="flat@40", is_autonomous=False), policies), Tape()
+    for _ in range(40):
+        tape.add(run.step())
+    run.take("bound")
+    for _ in range(40):
+        tape.add(run.step())
+    _, _, shift = counter(tape)
+    assert np.flatnonzero(shift).tolist() == [40]
 
 
 # The command --------------------------------------------------------------------------------------

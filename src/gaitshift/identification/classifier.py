@@ -31,7 +31,7 @@ _STATISTICS: tuple[AnyStatistic, ...] = (
     PlaneResidual(touches=2),
     PlaneResidual(touches=4),
     TouchdownSurprise(memory=1),
-    TouchdownSurprise(memory=3),
+    TouchdownSurprise(),
     TouchdownSurprise(memory=12),
     AttitudeVariance(window=0.3),
     AttitudeVariance(window=1.0),

@@ -23,6 +23,8 @@ class ConditionState:
 
     statistic: Any
     """What its statistic remembers."""
+    statistic_back: Any
+    """What that of the way back remembers; None where it is the same."""
     k: Float[np.ndarray, " N"]
     """Counter [counts] of the rule in force."""
     counted: Float[np.ndarray, " N"]
@@ -42,6 +44,9 @@ class Condition:
 
     statistic: AnyStatistic = field(default_factory=HeightDifference)
     """What is watched."""
+    statistic_back: AnyStatistic | None = None
+    """What is watched on the way back; None: the same; the paper's is the same. Ours: what tells
+    soonest that ground is rough need not be what tells soonest that it no longer is."""
     alpha: float = 0.04
     """α, in the statistic's unit: above it counts as rough; paper 0.2 m, ours: flat ground stays
     below."""
@@ -52,7 +57,7 @@ class Condition:
     leak: float = 0.0
     """What k loses in each step [counts]; the paper's never shrinks."""
     alpha_back: float = 0.035
-    """α', in the statistic's unit: all below it counts as flat; ours: most of bound's steps on
+    """α', in the unit of the way back: all below it counts as flat; ours: most of bound's steps on
     flat."""
     beta_back: float = 350.0
     """β' [counts], fire back when k exceeds it; ours: 3.5 s of flat steps, over twice what 10 m of
@@ -119,6 +124,7 @@ class Condition:
         """State of n robots that have not been seen yet."""
         return ConditionState(
             statistic=self.statistic.start(n),
+            statistic_back=None if self.statistic_back is None else self.statistic_back.start(n),
             k=np.zeros(n),
             counted=np.zeros(n),
             time_in_gait=np.zeros(n),
@@ -133,15 +139,19 @@ class Condition:
         the caller flips it when it obeys. Nothing given is written to.
         """
         memory, values = self.statistic.step(state.statistic, signals)
+        memory_back, values_back = None, values
+        if self.statistic_back is not None:
+            memory_back, values_back = self.statistic_back.step(state.statistic_back, signals)
         factor = 1.0 if self.modulation is None else self.modulation.factor(signals)
         rough, flat = self.rough, self.flat
         time = state.time_in_gait + signals.period
         k = np.where(
-            shifted, flat.step(state.k, values, factor), rough.step(state.k, values, factor)
+            shifted, flat.step(state.k, values_back, factor), rough.step(state.k, values, factor)
         )
         fire = np.where(shifted, flat.fires(k, time), rough.fires(k, time))
         after = ConditionState(
             statistic=memory,
+            statistic_back=memory_back,
             k=np.where(fire & self.reset, 0.0, k),
             counted=k,
             time_in_gait=np.where(fire, 0.0, time),

@@ -97,19 +97,27 @@ class GaitGraph:
         """The paper's two gaits: one condition, the way there and the way back."""
         if flat == rough:
             raise GaitshiftError(f"the gaits for flat and for rough ground are both '{flat}'")
-        ends = ((flat, rough, condition.rough), (rough, flat, condition.flat))
+        watched: dict[str, AnyStatistic] = {"ground": condition.statistic}
+        back = "ground"
+        if condition.statistic_back is not None:
+            back = "level ground"
+            watched[back] = condition.statistic_back
+        ends = (
+            (flat, rough, "ground", condition.rough),
+            (rough, flat, back, condition.flat),
+        )
         return cls(
             start=flat,
-            statistics={"ground": condition.statistic},
+            statistics=watched,
             edges=tuple(
                 Edge(
                     source=source,
                     target=target,
-                    statistic="ground",
+                    statistic=name,
                     rule=rule,
                     modulation=condition.modulation,
                 )
-                for source, target, rule in ends
+                for source, target, name, rule in ends
             ),
             reset=condition.reset,
         )

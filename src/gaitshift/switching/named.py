@@ -34,6 +34,16 @@ STATISTICS: dict[str, type[Any]] = {
 
 CONDITIONS: dict[str, Condition] = {
     "height_difference": Condition(),
+    # Numbers of `gaitshift identify` (docs/results/shifting).
+    "touchdown_surprise": Condition(
+        statistic=TouchdownSurprise(),
+        alpha=0.029,
+        beta=10.0,
+        statistic_back=HeightDifference(),
+        alpha_back=0.0055,
+        beta_back=18.0,
+        leak_back=0.12,
+    ),
     "paper": Condition.paper(),
 }
 """Conditions ready for use."""

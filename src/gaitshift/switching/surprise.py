@@ -1,12 +1,13 @@
 """How far from where the last touches let one expect it the ground ahead is met."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.switching.heading import HeadingState, HeadingWatch
 from gaitshift.switching.signals import Signals
 from gaitshift.switching.touches import Touches, TouchState, fit_plane
 
@@ -19,6 +20,8 @@ AHEAD = 0.1
 RIDGE = 0.02
 """[m²]: a plane through touches that are near one line does not tilt across it at will."""
 
+_HEADING = HeadingWatch()
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurpriseState:
@@ -26,24 +29,30 @@ class SurpriseState:
 
     touches: TouchState
     """The touches of all feet."""
+    heading: HeadingState
+    """The heading that the robot keeps to."""
     error: Float[np.ndarray, "N J"]
     """The last errors, the last first [m]; NaN before that: one more than the changes."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TouchdownSurprise:
-    """Root mean square of the changes of the last touchdowns' errors over √2 [m].
+    """How much the errors of the last touchdowns differ from one to the next [m].
 
     Each foot that comes down on new ground, ahead of all earlier touches, is held against the plane
     through those, along the vertical: that is its error. A slope has none; where it begins errors
     grow and fade, and from one touchdown to the next they change little; a single step changes them
-    once; noise changes them at each touchdown, by √2 times the error's own deviation (von Neumann
-    1941). Feet that come down where others stood before say nothing new, and do not count.
+    once; noise changes them at each touchdown. The number is the larger of two estimates of the
+    errors' own deviation that a drift does not disturb: root mean squares of their changes over √2
+    (von Neumann 1941), and of the changes of those over √6. Feet that come down where others stood
+    before say nothing new, and do not count. A robot that stumbles is thrown off its heading, and
+    odometry by its feet is worth nothing then: all is forgotten, and nothing said until there are
+    errors enough again.
     """
 
     touches: int = 3
     """Touches of each foot that the plane goes through."""
-    memory: int = 3
+    memory: int = 6
     """Changes that the mean is over."""
     least_swing: float = 0.05
     """A foot that comes down again sooner has bounced: it is the same touch [s]."""
@@ -63,25 +72,33 @@ class TouchdownSurprise:
 
     def start(self, n: int) -> SurpriseState:
         """State of n robots of which no foot has touched."""
-        nothing = np.full((n, self.memory + 1), np.nan)
-        return SurpriseState(touches=self._memory.start(n), error=nothing)
+        return SurpriseState(
+            touches=self._memory.start(n),
+            heading=_HEADING.start(n),
+            error=np.full((n, self.memory + 1), np.nan),
+        )
 
     def step(
         self, state: SurpriseState, signals: Signals
     ) -> tuple[SurpriseState, Float[np.ndarray, "N 1"]]:
-        """Errors after this step, and what their changes come to; NaN before the first."""
+        """Errors after this step, and what their changes come to; NaN until there are enough."""
         touches, new, foot = self._memory.step(state.touches, signals)
+        heading, stumbles = _HEADING.step(state.heading, signals)
         error = state.error
         ids = np.flatnonzero(new.any(axis=1))
         if ids.size:
             error = error.copy()
             error[ids] = self._take_in(error[ids], state.touches, touches, new, foot, ids)
-        change = np.diff(error, axis=1)
-        known = ~np.isnan(change)
-        count = known.sum(axis=1)
-        square = np.where(known, change * change, 0.0).sum(axis=1)
-        mean = np.where(count > 0, np.sqrt(square / (2.0 * np.maximum(count, 1))), np.nan)
-        return SurpriseState(touches=touches, error=error), mean[:, None]
+        if stumbles.any():
+            touch = np.where(stumbles[:, None, None, None], np.nan, touches.touch)
+            touches = replace(touches, touch=touch)
+            error = np.where(stumbles[:, None], np.nan, error)
+        change = error[:, :-1] - error[:, 1:]
+        deviation = np.sqrt(np.mean(change * change, axis=1) / 2.0)
+        if self.memory > 1:
+            change = change[:, :-1] - change[:, 1:]
+            deviation = np.maximum(deviation, np.sqrt(np.mean(change * change, axis=1) / 6.0))
+        return SurpriseState(touches=touches, heading=heading, error=error), deviation[:, None]
 
     def _take_in(
         self,

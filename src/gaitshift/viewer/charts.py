@@ -30,7 +30,9 @@ class Charts:
         self._colours = tuple(gait_colours(machines).values())
         gui = cast(Any, server.gui)
         self._contacts = gui.add_html(contact_svg(Tape(), self._colours))
-        self._counter = self._chart(gui, "k and β [counts]", ("k", "β"), (INK, "#d55e00"))
+        self._counter = self._chart(
+            gui, "k and β [counts]", ("k", "β", "shift"), (INK, "#d55e00", "#0072b2")
+        )
         self._heights = self._chart(gui, "heights of the last touches [m]", LEGS, LEG_COLOURS)
         self._speed = self._chart(gui, "speed [m/s]", ("speed",), (INK,))
         self._machine = gui.add_html("")
@@ -45,7 +47,7 @@ class Charts:
         if len(time) < 2:
             return
         heights = tape.of("foot_height")
-        self._counter.data = (time, tape.of("k").astype(float), tape.of("threshold").astype(float))
+        self._counter.data = (time, *counter(tape))
         self._heights.data = (time, *heights.T.astype(float))
         self._speed.data = (time, tape.of("speed").astype(float))
         gait, state = int(last.gait[tape.robot]), int(last.machine_state[tape.robot])
@@ -72,6 +74,15 @@ class Charts:
             legend={"show": len(names) > 1, "live": False},
             height=_HEIGHT,
         )
+
+
+def counter(tape: Tape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """k, β, and the shifts: as high as the larger of both where the gait changes, 0 elsewhere."""
+    k, beta, gait = (tape.of(name) for name in ("k", "threshold", "gait"))
+    shift = np.zeros(len(k))
+    changed = np.flatnonzero(gait[1:] != gait[:-1])
+    shift[changed + 1] = np.maximum(np.maximum(k, beta)[changed], 1.0)
+    return k.astype(float), beta.astype(float), shift
 
 
 def contact_svg(tape: Tape, colours: tuple[str, ...]) -> str:

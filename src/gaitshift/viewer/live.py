@@ -110,7 +110,7 @@ class LiveRun:
         switcher = self._walk.switcher
         if config.is_autonomous != before.is_autonomous or not isinstance(switcher, Autonomous):
             self._walk.switcher = self._switcher(config)
-        elif config.condition.statistic == before.condition.statistic:
+        elif config.graph.statistics == before.graph.statistics:
             switcher.retune(config.graph)
         else:
             self._walk.switcher = self._switcher(config)

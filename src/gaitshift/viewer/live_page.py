@@ -158,18 +158,20 @@ class LivePage:
 
     def _build_condition(self, gui: Any, condition: Condition) -> None:
         names = tuple(CONDITIONS)
-        name = gui.add_dropdown("condition", names, initial_value=names[0])
-        slider = gui.add_slider
+        now = next((name for name in names if CONDITIONS[name] == condition), names[0])
+        name = gui.add_dropdown("condition", names, initial_value=now)
+        ranges = {
+            "alpha": ("α [m]", 0.001, 0.3, 0.001),
+            "beta": ("β [counts]", 0, 1500, 1),
+            "leak": ("leak [counts/step]", 0, 6, 0.01),
+            "alpha_back": ("α' [m]", 0.001, 0.3, 0.0005),
+            "beta_back": ("β' [counts]", 0, 1500, 1),
+        }
         numbers = {
-            "alpha": slider("α [m]", min=0.005, max=0.3, step=0.005, initial_value=condition.alpha),
-            "beta": slider("β [counts]", min=0, max=1500, step=10, initial_value=condition.beta),
-            "leak": slider("leak [counts/step]", min=0, max=6, step=0.1, initial_value=0.0),
-            "alpha_back": slider(
-                "α' [m]", min=0.005, max=0.3, step=0.005, initial_value=condition.alpha_back
-            ),
-            "beta_back": slider(
-                "β' [counts]", min=0, max=1500, step=10, initial_value=condition.beta_back
-            ),
+            key: gui.add_slider(
+                label, min=low, max=high, step=step, initial_value=getattr(condition, key)
+            )
+            for key, (label, low, high, step) in ranges.items()
         }
 
         def tuned() -> None:
