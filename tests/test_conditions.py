@@ -321,8 +321,7 @@ def test_where_a_slope_begins_touches_surprise_less_than_a_step_of_its_rise_in_a
 
 
 def test_on_heights_that_know_nothing_of_one_another_it_is_their_deviation():
-    """Independent heights of 3 cm; the plane through nine to twelve of them adds some 10 %, the
-    larger of two estimates of few changes some more."""
+    """The plane through a dozen of them adds some 10 %, the larger of two estimates some more."""
     heights = np.random.default_rng(5).normal(scale=0.03, size=(400, 41))
     walk = {"turn": 0.0, "wobble": 0.0, "seconds": 18.0}
     seen = course(
@@ -349,8 +348,10 @@ def test_who_turns_steadily_or_sways_keeps_to_the_heading():
 
 
 def test_who_is_turned_aside_is_thrown_off_the_heading_for_a_while():
-    """By 0.3 rad at once: the error of a critically damped follower, (1 - ωt) exp(-ωt), is below
-    0.08 / 0.3 of it from ωt = 0.54 on."""
+    """A critically damped follower is off by (1 - ωt) exp(-ωt) of a turn of 0.3 rad at once.
+
+    From ωt = 0.54 on that is less than 0.08 rad.
+    """
     off = follow([0.0] * 100 + [0.3] * 300)
     assert not off[:100].any()
     assert off[100:].sum() == pytest.approx(0.54 / HeadingWatch().frequency / PERIOD, abs=2)
