@@ -1,10 +1,15 @@
 """Pages looked at in the system's Chromium."""
 
 import shutil
+from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+
+SCREENS = Path(__file__).parent.parent / "out" / "screens"
 
 needed = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 
@@ -20,6 +25,24 @@ def opened(browser, address, **context):
     page.set_default_timeout(200_000)
     page.goto(address, wait_until="commit")
     return page, wrong
+
+
+def keep(page, name):
+    """A screenshot for whoever looks at what a test run leaves: out/screens/NAME.png.
+
+    Its points as an array of rows, columns and colours.
+    """
+    SCREENS.mkdir(parents=True, exist_ok=True)
+    path = SCREENS / f"{name}.png"
+    page.screenshot(path=path)
+    return np.asarray(Image.open(path).convert("RGB"))
+
+
+def shows_a_robot(points):
+    """Whether something dark, as the robot is, stands in the middle of a bright picture."""
+    high, wide, _ = points.shape
+    middle = points[high // 6 : -high // 6, wide // 6 : -wide // 6].max(axis=2)
+    return 0.003 < np.mean(middle < 80) < 0.4 and np.mean(middle > 120) > 0.3
 
 
 def launched(play):

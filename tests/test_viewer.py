@@ -309,3 +309,38 @@ def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
     process.send_signal(signal.SIGINT)
     assert process.wait(20) == 0
     assert "closed" in process.stderr.read()
+
+
+def enter(page, label, number):
+    """Types a number beside the slider of this label."""
+    row = page.locator("div").filter(has=page.locator("label", has_text=label)).last
+    box = row.locator("xpath=..").locator("input.mantine-NumberInput-input")
+    box.fill(str(number))
+    box.press("Enter")
+
+
+def gait_is(page, gait):
+    return lambda: status(page)[0] == gait
+
+
+@pytest.mark.slow
+@browsing.needed
+def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(served, browser):
+    """No feet differ by 0.3 m on this ground, and nearly all steps differ by 5 mm."""
+    _, address = served("--track", "perlin:0.1@300")
+    page, wrong = opened(browser, address)
+    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
+    enter(page, "α [m]", 0.3)
+    enter(page, "α' [m]", 0.3)
+    wait_until(gait_is(page, "trot"))
+    walked = status(page)[1]
+    wait_until(lambda: status(page)[1] > walked + 3.0)
+    assert status(page)[0] == "trot"
+    enter(page, "α' [m]", 0.001)
+    enter(page, "α [m]", 0.005)
+    wait_until(gait_is(page, "bound"))
+    picture = browsing.keep(page, "view")
+    assert browsing.shows_a_robot(picture[:, : picture.shape[1] * 2 // 3]), "beside the panel"
+    page.get_by_role("button", name="push", exact=True).click()
+    time.sleep(1.0)
+    assert not wrong

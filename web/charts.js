@@ -1,7 +1,8 @@
 // Signals over time, each in a row of its own on one axis; hover to read, drag to go there, wheel to zoom.
+// Without `seek` there is nowhere to go: the course of a training, over its iterations.
 const LEFT = 58, RIGHT = 12, ROW = 92, BARS = 76, GAP = 30, AXIS = 34;
 
-export function charts(holder, data, seek) {
+export function charts(holder, data, seek = null) {
   const canvas = document.createElement("canvas");
   canvas.setAttribute("role", "img");
   canvas.setAttribute("aria-label", data.rows.map((row) => row.title).join(", "));
@@ -9,7 +10,7 @@ export function charts(holder, data, seek) {
   note.className = "note";
   holder.append(canvas, note);
   const last = data.time[data.time.length - 1];
-  let span = [0, last], now = 0, hover = null;
+  let span = [0, last], now = seek ? 0 : null, hover = null;
   const rows = data.rows;
   const heights = rows.map((row) => (row.kind === "contacts" ? BARS : ROW));
   const high = heights.reduce((sum, h) => sum + h + GAP, 0) + AXIS;
@@ -57,20 +58,20 @@ export function charts(holder, data, seek) {
       pen.fillText(`${+t.toFixed(3)}`, x(t), top + 12);
       pen.fillRect(x(t), top - 6, 1, 4);
     }
-    pen.fillText("time [s]", (LEFT + wide - RIGHT) / 2, top + 28);
+    pen.fillText(data.axis ?? "time [s]", (LEFT + wide - RIGHT) / 2, top + 28);
     for (const t of data.shifts) {
       if (t < span[0] || t > span[1]) continue;
       pen.fillStyle = quiet;
       for (let y = 0; y < top - 8; y += 6) pen.fillRect(x(t), y, 1, 3);
     }
     pen.fillStyle = style("--accent");
-    if (now >= span[0] && now <= span[1]) pen.fillRect(x(now) - 0.75, 0, 1.5, top - 6);
+    if (now !== null && now >= span[0] && now <= span[1]) pen.fillRect(x(now) - 0.75, 0, 1.5, top - 6);
     if (hover !== null) {
       pen.fillStyle = quiet;
       pen.fillRect(x(hover), 0, 1, top - 6);
     }
-    const i = index(hover ?? now);
-    note.textContent = [`${data.time[i].toFixed(2)} s`, data.gaits[data.gait[i]].title]
+    const i = index(hover ?? now ?? last);
+    note.textContent = (data.axis ? [`${data.axis} ${data.time[i]}`] : [`${data.time[i].toFixed(2)} s`, data.gaits[data.gait[i]].title])
       .concat(rows.filter((row) => row.kind === "lines").flatMap((row) =>
         row.series.map((one) => `${one.name} ${one.values[i].toFixed(row.digits)}${row.unit && " " + row.unit}`)))
       .join("  ·  ");
@@ -162,7 +163,7 @@ export function charts(holder, data, seek) {
     return Math.min(Math.max(span[0] + share * (span[1] - span[0]), span[0]), span[1]);
   };
   let drags = false;
-  canvas.addEventListener("pointerdown", (e) => ((drags = true), canvas.setPointerCapture(e.pointerId), seek(timeAt(e))));
+  canvas.addEventListener("pointerdown", (e) => ((drags = seek !== null), drags && (canvas.setPointerCapture(e.pointerId), seek(timeAt(e)))));
   canvas.addEventListener("pointermove", (e) => {
     hover = timeAt(e);
     if (drags) seek(hover);
@@ -189,6 +190,7 @@ export function charts(holder, data, seek) {
 
   function show(time) {
     now = time;
+    if (now === null) return draw();
     const width = span[1] - span[0];
     if (width < last && (time < span[0] || time > span[1])) {
       const begin = Math.min(Math.max(time - width / 2, 0), last - width);

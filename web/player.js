@@ -3,7 +3,9 @@
 import { scene } from "./scene.js";
 import { charts } from "./charts.js";
 
-const run = JSON.parse(document.getElementById("run").textContent);
+const walks = document.querySelectorAll("script[data-walk]");
+const which = Math.min(Number(location.hash.slice(1)) || 0, walks.length - 1);
+const run = JSON.parse(walks[which].textContent);
 const TYPES = { f4: Float32Array, u4: Uint32Array, u1: Uint8Array, i2: Int16Array };
 
 /** An array that Python wrote as { type, shape, base64 }. */
@@ -33,6 +35,17 @@ slider.max = state.end;
 
 const view = scene(document.getElementById("scene"), data);
 const plots = charts(document.getElementById("charts"), data, seek);
+
+const course = document.getElementById("course");
+const learning = course && charts(course, unpackAll(JSON.parse(document.getElementById("progress").textContent)));
+const choice = document.getElementById("walk");
+if (choice) {
+  choice.value = which;
+  choice.addEventListener("change", () => {
+    location.hash = choice.value;
+    location.reload(); // another walk is another page
+  });
+}
 
 function seek(time) {
   state.time = Math.min(Math.max(time, 0), state.end);
@@ -77,13 +90,17 @@ theme.addEventListener("click", () => {
   const root = document.documentElement;
   const dark = getComputedStyle(root).getPropertyValue("--dark").trim() === "1";
   root.dataset.theme = dark ? "light" : "dark";
-  view.recolour();
-  plots.show(state.time);
+  recolour();
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  recolour();
+});
+
+function recolour() {
   view.recolour();
   plots.show(state.time);
-});
+  if (learning) learning.show(null);
+}
 
 let before = performance.now();
 function tick(now) {

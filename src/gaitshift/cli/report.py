@@ -1,26 +1,38 @@
-"""`gaitshift report`: a log as one page that opens from disk."""
+"""`gaitshift report`: a log, or a training, as one page that opens from disk."""
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
+from gaitshift import policy as policies
+from gaitshift.cli.output import progress, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.evaluation import EvaluationConfig, evaluate
 from gaitshift.log import Log
+
+_TRACK, _SECONDS = "flat@5,perlin:0.1@12", 9.0
+"""What policies of a training are shown on."""
+
+_CHECKPOINTS = 4
+"""Most of them that are shown beside the policy at the end."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """Make one self-contained page of a log: the robot to turn around, its signals, its gaits.
+    """Make one self-contained page of a log or of a training run.
 
-    The page opens from disk, without a network, on any machine.
+    Of a log: the robot to turn around, its signals, its gaits. Of a training: what its policies do
+    from checkpoint to checkpoint, its course and its verdicts. The page opens from disk, without a
+    network, on any machine.
     """
 
-    log: Annotated[Path, tyro.conf.Positional]
-    """A log of `demo`, `evaluate`, `record` or `view`."""
+    source: Annotated[Path, tyro.conf.Positional]
+    """A log of `demo`, `evaluate`, `record` or `view`, or the folder of a training."""
     out: Path | None = None
-    """The HTML file; beside the log, with its name, by default."""
+    """The HTML file; beside the log with its name, or report.html in the run, by default."""
     robot: int = 0
     """Which robot of the log, counted from 0."""
     video: Path | None = None
@@ -30,15 +42,67 @@ class Report:
 
     def run(self) -> None:
         """Writes the page."""
-        from gaitshift.report import write_report  # matplotlib is slow to import
-
-        log = Log.load(self.log)
-        path = self.out or self.log.with_suffix(".html")
+        is_run = self.source.is_dir()
+        default = self.source / "report.html" if is_run else self.source.with_suffix(".html")
+        log = None if is_run else Log.load(self.source)
+        path = self.out or default
         if path.exists() and not self.overwrite:
             raise GaitshiftError(f"{path} is there already; --overwrite replaces it")
         if self.video is not None and not self.video.is_file():
             raise GaitshiftError(f"no video {self.video}")
         if not path.parent.is_dir():
             raise GaitshiftError(f"no folder {path.parent} for the page")
-        write_report(log, path, robot=self.robot, video=self.video)
+        if log is None:
+            self._tell_training(path)
+        else:
+            from gaitshift.report import write_report  # matplotlib is slow to import
+
+            write_report(log, path, robot=self.robot, video=self.video)
         print(path)
+
+    def _tell_training(self, path: Path) -> None:
+        from gaitshift.report import write_training_report
+
+        final = self.source / "policy.onnx"
+        if not final.is_file():
+            raise GaitshiftError(
+                f"{self.source} holds no policy.onnx: a log, or the folder of a training that has "
+                "come to an end or was stopped by Ctrl-C, would be right"
+            )
+        policy = policies.load(final)
+        walks = [*_checkpoints(self.source), ("at the end", _walk(policy))]
+        iterations = policy.info.training["iterations"]
+        write_training_report(
+            self.source,
+            path,
+            walks[::-1],
+            title=f"Training of {policy.machine.title}",
+            summary=f"{iterations} iterations, {policy.info.training['steps']:,} control steps",
+        )
+
+
+def _walk(policy: policies.Policy) -> Log:
+    return evaluate(policy, EvaluationConfig(terrain=_TRACK, episodes=1, seconds=_SECONDS))[1]
+
+
+def _checkpoints(folder: Path) -> list[tuple[str, Log]]:
+    """Walks of policies from the run's checkpoints, about evenly spread; none without torch."""
+    try:
+        from gaitshift.training.run import Run
+    except ImportError as error:
+        say(f"checkpoints are left out: they need '{error.name}' (gaitshift[train])")
+        return []
+    found = sorted(int(path.stem) for path in (folder / "checkpoints").glob("*.pt"))[:-1]
+    found = [iteration for iteration in found if iteration > 0]
+    if not found:
+        return []
+    count = min(_CHECKPOINTS, len(found))
+    chosen = [found[round(i * (len(found) - 1) / max(count - 1, 1))] for i in range(count)]
+    run, walks = Run.resume(folder), list[tuple[str, Log]]()
+    with tempfile.TemporaryDirectory() as scratch, progress("checkpoints") as report:
+        for done, iteration in enumerate(chosen):
+            path = Path(scratch) / "policy.onnx"
+            run.write_policy_at(iteration, path)
+            walks.append((f"iteration {iteration}", _walk(policies.load(path))))
+            report(done + 1, count)
+    return walks

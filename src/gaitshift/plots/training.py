@@ -18,7 +18,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.plots.palette import INK, PALE, QUIET
 from gaitshift.plots.style import check_target, few_ticks, house_style, name_row, save
 
-_ROWS = (
+COURSES = (
     ("reward", 1.0, "reward [per control step]"),
     ("speed", 1.0, "forward speed [m/s]"),
     ("survival", 100.0, "chance to walk 10 s without a fall [%]"),
@@ -26,7 +26,7 @@ _ROWS = (
 )
 """Column, factor, and name of the row."""
 
-_NEEDED = ("iteration", "stage", "steps", "wall_s", *(column for column, _, _ in _ROWS))
+_NEEDED = ("iteration", "stage", "steps", "wall_s", *(column for column, _, _ in COURSES))
 
 _LIMITS = {"survival": (-4.0, 104.0)}
 """Ends of the scale where the course does not give them."""
@@ -48,14 +48,14 @@ def training_curves(progress_csv: Path, path: Path) -> Figure:
             ending, or no such folder.
     """
     check_target(path)
-    table = _read(progress_csv)
-    steps = _numbers(table, "steps", progress_csv) / 1e6
-    wall = _numbers(table, "wall_s", progress_csv) / 60
+    table = read_progress(progress_csv)
+    steps = numbers(table, "steps", progress_csv) / 1e6
+    wall = numbers(table, "wall_s", progress_csv) / 60
     with house_style():
         figure = Figure(figsize=_SIZE)
-        page = list(figure.subplots(len(_ROWS), sharex=True))
-        for axes, (column, factor, label) in zip(page, _ROWS, strict=True):
-            _draw_course(axes, steps, factor * _numbers(table, column, progress_csv))
+        page = list(figure.subplots(len(COURSES), sharex=True))
+        for axes, (column, factor, label) in zip(page, COURSES, strict=True):
+            _draw_course(axes, steps, factor * numbers(table, column, progress_csv))
             axes.set_ylim(_LIMITS.get(column))
             name_row(axes, label)
         _mark_stages(page, steps, [row["stage"] for row in table])
@@ -67,7 +67,12 @@ def training_curves(progress_csv: Path, path: Path) -> Figure:
     return figure
 
 
-def _read(path: Path) -> list[dict[str, str]]:
+def read_progress(path: Path) -> list[dict[str, str]]:
+    """The lines of a training's `progress.csv`.
+
+    Raises:
+        GaitshiftError: no such file, not a `progress.csv`, or fewer than two iterations.
+    """
     try:
         with path.open(newline="") as file:
             table = list(csv.DictReader(file))
@@ -81,7 +86,8 @@ def _read(path: Path) -> list[dict[str, str]]:
     return table
 
 
-def _numbers(table: list[dict[str, str]], column: str, path: Path) -> Float[np.ndarray, " n"]:
+def numbers(table: list[dict[str, str]], column: str, path: Path) -> Float[np.ndarray, " n"]:
+    """A column of them; `path` is for errors."""
     try:
         return np.array([float(row[column]) for row in table])
     except (TypeError, ValueError) as error:

@@ -47,12 +47,12 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
     planes = [_plane(frame.touch_w[0]) for frame in frames]
     bits = (alone.contact[:, 0] * (1 << np.arange(len(LEGS)))).sum(axis=1)
     return {
-        "time": _packed(log.time, "f4"),
+        "time": packed(log.time, "f4"),
         "period": period(log),
         "every": EVERY,
         "frames": len(frames),
-        "contact": _packed(bits, "u1"),
-        "gait": _packed(alone.gait[:, 0], "u1"),
+        "contact": packed(bits, "u1"),
+        "gait": packed(alone.gait[:, 0], "u1"),
         "gaits": [
             {"name": name, "title": title_of(name), "colour": colour}
             for name, colour in gait_colours(log.gaits).items()
@@ -62,16 +62,16 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
         "bodies": [
             {
                 "name": body.name,
-                "vertices": _packed(body.mesh.vertices, "f4"),
-                "faces": _packed(body.mesh.faces, "u4"),
-                "colours": _packed(cast(Any, body.mesh).visual.vertex_colors[:, :3], "u1"),
+                "vertices": packed(body.mesh.vertices, "f4"),
+                "faces": packed(body.mesh.faces, "u4"),
+                "colours": packed(cast(Any, body.mesh).visual.vertex_colors[:, :3], "u1"),
             }
             for body in shape.bodies
         ],
-        "position": _packed(position.swapaxes(0, 1), "f4"),
-        "rotation": _packed(rotation.swapaxes(0, 1), "f4"),
-        "feet": _packed(feet, "f4"),
-        "plane": _packed(np.array(planes), "f4"),
+        "position": packed(position.swapaxes(0, 1), "f4"),
+        "rotation": packed(rotation.swapaxes(0, 1), "f4"),
+        "feet": packed(feet, "f4"),
+        "plane": packed(np.array(planes), "f4"),
         "ground": _ground(_around(ground_of(log), alone.qpos[:, 0, :2].astype(float))),
         "rows": _rows(log, robot),
     }
@@ -90,31 +90,31 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
         heights = _since_touched(log, robot).T
         feet = zip(LEGS, heights, LEG_COLOURS, strict=True)
         rows += [
-            _lines(
+            lines(
                 "height of each foot's last touch [m]",
-                [_series(leg, height, colour) for leg, height, colour in feet],
+                [series(leg, height, colour) for leg, height, colour in feet],
                 unit="m",
                 digits=3,
             ),
-            _lines(
+            lines(
                 "counter k and what it is held against, β [counts]",
                 [
-                    _series("k", log.k[:, robot], "ink"),
-                    _series("β", log.threshold[:, robot], "#d55e00"),
+                    series("k", log.k[:, robot], "ink"),
+                    series("β", log.threshold[:, robot], "#d55e00"),
                 ],
                 digits=0,
                 zero=True,
             ),
         ]
     speeds = [
-        _series("speed", forward_speed(log, robot), "ink"),
-        _series("asked for", log.command[:, robot, 0], "#0072b2"),
+        series("speed", forward_speed(log, robot), "ink"),
+        series("asked for", log.command[:, robot, 0], "#0072b2"),
     ]
     base, below = log.qpos[:, robot, 2], ground_below(log, robot)
-    levels = [_series("ground", below, GROUND, fill=True), _series("base", base, "ink")]
+    levels = [series("ground", below, GROUND, fill=True), series("base", base, "ink")]
     rows += [
-        _lines("speed along the robot's axis [m/s]", speeds, unit="m/s", digits=2),
-        _lines("height of the base and of the ground below it [m]", levels, unit="m", digits=2),
+        lines("speed along the robot's axis [m/s]", speeds, unit="m/s", digits=2),
+        lines("height of the base and of the ground below it [m]", levels, unit="m", digits=2),
     ]
     return rows
 
@@ -125,9 +125,10 @@ def _since_touched(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
     return np.where(touched, log.foot_height[:, robot], np.nan)
 
 
-def _lines(
+def lines(
     title: str, series: list[dict[str, Any]], *, unit: str = "", digits: int, zero: bool = False
 ) -> dict[str, Any]:
+    """A chart of some series over time; `zero`: its axis reaches down to 0."""
     return {
         "kind": "lines",
         "title": title,
@@ -139,10 +140,11 @@ def _lines(
     }
 
 
-def _series(
+def series(
     name: str, values: Shaped[np.ndarray, " T"], colour: str, *, fill: bool = False
 ) -> dict[str, Any]:
-    return {"name": name, "values": _packed(values, "f4"), "colour": colour, "fill": fill}
+    """A line of a chart, with an entry for each of the times."""
+    return {"name": name, "values": packed(values, "f4"), "colour": colour, "fill": fill}
 
 
 def _plane(touch_w: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
@@ -181,10 +183,11 @@ def _ground(ground: Terrain) -> dict[str, Any]:
         "columns": len(x),
         "x": [float(x[0]), float(x[1] - x[0])],
         "y": [float(y[0]), float(y[1] - y[0])],
-        "height": _packed(height, "f4"),
+        "height": packed(height, "f4"),
     }
 
 
-def _packed(values: np.ndarray, kind: str) -> dict[str, str]:
+def packed(values: np.ndarray, kind: str) -> dict[str, str]:
+    """An array as the player unpacks it: f4, u4 or u1, little-endian, in base64."""
     array = np.ascontiguousarray(values, dtype=_TYPES[kind])
     return {"type": kind, "data": base64.b64encode(array.tobytes()).decode("ascii")}

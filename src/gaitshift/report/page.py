@@ -1,68 +1,51 @@
 """The page of a report: one HTML file that asks for nothing else, and opens from disk."""
 
-import base64
 import html
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from gaitshift import gaits
-from gaitshift.errors import GaitshiftError
-from gaitshift.gait_analysis import measure, robot_mass
-from gaitshift.log import Log
-from gaitshift.plots.signals import check_robot, fall_time, gait_spans, shift_times
-from gaitshift.report.data import run_data, title_of
-from gaitshift.robot import ROBOTS
-
-MOST_VIDEO = 6_000_000
-"""A video of more bytes is left out: the page would grow beyond what opens quickly."""
-
-_LEAST_STRETCH = 3.0
-"""A gait is judged where it was in force for this long [s]; the first second is left out."""
+Row = tuple[Sequence[str], float | None]
+"""Cells of a row, and the time that a click on it leads to [s]."""
 
 
-def write_report(
-    log: Log,
+def write_page(
     path: Path,
     *,
-    robot: int = 0,
-    video: Path | None = None,
-    facts: Mapping[str, str] | None = None,
+    title: str,
+    summary: str,
+    walks: Sequence[tuple[str, Mapping[str, Any]]],
+    sections: Sequence[tuple[str, str]],
+    course: Mapping[str, Any] | None = None,
 ) -> None:
-    """Writes the page of one robot's run, whole or not at all.
+    """Writes a page, whole or not at all.
 
     Args:
-        log: the run.
         path: the HTML file.
-        robot: whose run.
-        video: an mp4 to show beside it, where it is not too large.
-        facts: what made the run, in words, by name.
-
-    Raises:
-        GaitshiftError: a robot that is not in the log, or one of an unknown kind.
+        title: its heading.
+        summary: a line below it.
+        walks: names and data (`run_data`) of what the player shows; several are chosen from.
+        sections: headings and HTML, from the top down; empty ones are left out.
+        course: charts over something else than time, which stand before the sections.
     """
-    check_robot(log, robot)
-    if log.robot not in ROBOTS:
-        raise GaitshiftError(f"the log is of '{log.robot}'; known: {', '.join(ROBOTS)}")
-    spans = gait_spans(log, robot)
-    title = " → ".join(title_of(name) for name, _ in spans[:8]) + (" → …" if spans[8:] else "")
-    data = json.dumps(run_data(log, robot), separators=(",", ":"), allow_nan=False)
-    known = {"ground": log.terrain, "robot": log.robot, "seen": f"robot {robot + 1} of {_n(log)}"}
-    made = {f"{name} version": version(name) for name in ("gaitshift", "mujoco-core", "numpy")}
+    names = [html.escape(name) for name, _ in walks]
+    options = "".join(f"<option value='{i}'>{name}</option>" for i, name in enumerate(names))
+    choice = f"<p><label>policy <select id='walk'>{options}</select></label></p>"
+    shown = [(head, content) for head, content in sections if content]
+    body = "".join(f"<h2>{html.escape(head)}</h2>{content}" for head, content in shown)
+    data = "".join(_json(f"run{i}", walk, " data-walk") for i, (_, walk) in enumerate(walks))
+    if course is not None:
+        body = f"<h2>Course of the training</h2><div id='course'></div>{body}"
+        data += _json("progress", course)
     parts = {
         "TITLE": html.escape(f"{title} · gaitshift"),
         "HEAD": html.escape(title),
-        "SUMMARY": html.escape(_summary(log, robot)),
-        "VIDEO": _video(video),
-        "STRETCHES": _table(_STRETCH_HEAD, _stretches(log, robot)),
-        "SHIFTS": _table(_SHIFT_HEAD, _shifts(log, robot)) or "<p>It kept its gait.</p>",
-        "FACTS": _table((), [((name, value), None) for name, value in _all(known, facts, made)]),
-        "DATA": data.replace("</", "<\\/"),
+        "SUMMARY": html.escape(summary),
+        "CHOICE": choice if len(walks) > 1 else "",
+        "SECTIONS": body,
+        "DATA": data,
         "PLAYER": _read("player.js").replace("</script", "<\\/script"),
     }
     text = _read("page.html")
@@ -73,71 +56,13 @@ def write_report(
     part.replace(path)
 
 
-_Row = tuple[tuple[str, ...], float | None]
-"""Cells of a row, and the time that a click on it leads to [s]."""
-
-_STRETCH_HEAD = ("gait", "from", "to", "named by its contacts", "speed", "pattern", "misses")
-_SHIFT_HEAD = ("at", "where", "from", "to", "k")
+def _json(name: str, value: Mapping[str, Any], mark: str = "") -> str:
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    return f'<script type="application/json" id="{name}"{mark}>{text}</script>\n'
 
 
-def _summary(log: Log, robot: int) -> str:
-    fell = fall_time(log, robot)
-    seconds = float(log.time[-1]) if fell is None else fell
-    way = float(log.qpos[np.searchsorted(log.time, seconds) - 1, robot, 0] - log.qpos[0, robot, 0])
-    count = len(shift_times(log, robot))
-    shifts = "no shift of gait" if count == 0 else f"{count} shift{'s' * (count > 1)} of gait"
-    end = "on its feet to the end" if fell is None else f"fallen after {fell:.1f} s"
-    return f"{way:.1f} m in {seconds:.1f} s, {way / seconds:.2f} m/s, {shifts}, {end}"
-
-
-def _shifts(log: Log, robot: int) -> list[_Row]:
-    rows: list[_Row] = []
-    for (before, _), (after, span) in zip(
-        gait_spans(log, robot), gait_spans(log, robot)[1:], strict=False
-    ):
-        x = float(log.qpos[span.entry, robot, 0])
-        k = f"{log.k[span.entry, robot]:.0f} of {log.threshold[span.entry, robot]:.0f}"
-        cells = (f"{span.begin:.2f} s", f"{x:.2f} m", title_of(before), title_of(after), k)
-        rows.append((cells, max(span.begin - 1.0, 0.0)))
-    return rows
-
-
-def _stretches(log: Log, robot: int) -> list[_Row]:
-    rows: list[_Row] = []
-    alone = log.robots(slice(robot, robot + 1))
-    machines = {name: gaits.load(name) for name in log.gaits if name in gaits.names()}
-    for name, span in gait_spans(log, robot):
-        cells = [title_of(name), f"{span.begin:.1f} s", f"{span.end:.1f} s"]
-        if name not in machines or span.end - span.begin < _LEAST_STRETCH:
-            rows.append(((*cells, "too short to judge", "", "", ""), span.begin))
-            continue
-        end = int(np.searchsorted(log.time, span.end - 1e-9))
-        figures = _judged(alone.part(slice(span.entry, end)), machines)
-        verdict, misses = figures["verdict"], [m["figure"] for m in figures["verdict"]["misses"]]
-        named = title_of(verdict["gait"]) if verdict["gait"] != "none" else "no gait"
-        cells += [f"{named}{', clean' if verdict['clean'] else ''}"]
-        cells += [_number(figures["speed_mean"], " m/s"), _number(figures["pattern_fraction"], "")]
-        rows.append(((*cells, ", ".join(m.replace("_", " ") for m in misses)), span.begin))
-    return rows
-
-
-def _judged(stretch: Log, machines: Mapping[str, Any]) -> dict[str, Any]:
-    """Figures of a stretch, its time counted from its beginning."""
-    moved = replace(stretch, time=stretch.time - float(stretch.time[0]))
-    return measure(moved, machines, mass=robot_mass(stretch.robot), warm_up=1.0)
-
-
-def _video(path: Path | None) -> str:
-    if path is None or not path.is_file() or path.stat().st_size > MOST_VIDEO:
-        return ""
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    return (
-        "<h2>Film</h2><video controls muted playsinline preload='auto' "
-        f"src='data:video/mp4;base64,{data}'></video>"
-    )
-
-
-def _table(head: Sequence[str], rows: Sequence[_Row]) -> str:
+def table(head: Sequence[str], rows: Sequence[Row]) -> str:
+    """Rows of text below a head, as HTML; nothing where there are no rows."""
     if not rows:
         return ""
     top = "".join(f"<th>{html.escape(cell)}</th>" for cell in head)
@@ -149,17 +74,12 @@ def _table(head: Sequence[str], rows: Sequence[_Row]) -> str:
     return f"<div class='wide'><table>{start}<tbody>{body}</tbody></table></div>"
 
 
-def _all(*some: Mapping[str, str] | None) -> list[tuple[str, str]]:
-    return [(name, str(value)) for each in some if each for name, value in each.items()]
-
-
-def _number(value: float | None, unit: str) -> str:
-    return "–" if value is None else f"{value:.2f}{unit}"
+def facts_table(*some: Mapping[str, str] | None) -> str:
+    """What made it, and the versions that wrote the page."""
+    made = {f"{name} version": version(name) for name in ("gaitshift", "mujoco-core", "numpy")}
+    given = [each for each in (*some, made) if each]
+    return table((), [((n, str(value)), None) for each in given for n, value in each.items()])
 
 
 def _read(name: str) -> str:
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
-
-
-def _n(log: Log) -> int:
-    return log.k.shape[1]

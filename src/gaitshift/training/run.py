@@ -146,8 +146,17 @@ class Run:
             self.export()
         return self.folder / POLICY
 
-    def export(self) -> None:
-        """Writes the present policy into the folder."""
+    def write_policy_at(self, iteration: int, path: Path) -> None:
+        """Writes the policy as it stood at a checkpoint; the run itself stands there then.
+
+        Raises:
+            GaitshiftError: no such checkpoint, or a damaged one.
+        """
+        self._load_checkpoint(self.folder / CHECKPOINTS / f"{iteration:06d}.pt")
+        self.export(path)
+
+    def export(self, path: Path | None = None) -> None:
+        """Writes the present policy, into the run's folder if no path is given."""
         training = {
             "command": self.command,
             "seed": self.seed,
@@ -157,7 +166,7 @@ class Run:
         }
         info = describe(self.learner.env, training)
         ppo = self.learner.ppo
-        export(ppo.actor, info, self.folder / POLICY, self._averaged(), ppo.critic)
+        export(ppo.actor, info, path or self.folder / POLICY, self._averaged(), ppo.critic)
 
     def _averaged(self) -> torch.nn.Sequential:
         """The present actor's layers, their weights averaged with those of the last checkpoints."""

@@ -21,7 +21,11 @@ _FOLLOW = 0.08
 
 
 class Scene:
-    """What is drawn of one ground and N robots; everything stands in the frame `/world`."""
+    """What is drawn of one ground and N robots.
+
+    The ground hangs in the frame `/world`, which moves; robots are drawn where they are in the
+    picture, so that they stay in it where a slow browser is behind with one of the two.
+    """
 
     def __init__(self, server: viser.ViserServer, robot: Robot, gaits: tuple[str, ...]) -> None:
         self._scene = cast(Any, server.scene)
@@ -54,7 +58,7 @@ class Scene:
         }
         self._bodies = [
             self._scene.add_batched_meshes_trimesh(
-                f"/world/robot/{body.name}", body.mesh, lod="off", **pose
+                f"/robot/{body.name}", body.mesh, lod="off", **pose
             )
             for body in self._shape.bodies
         ]
@@ -63,7 +67,7 @@ class Scene:
         dot = cast(Any, trimesh.creation).icosphere(subdivisions=1, radius=0.018)
         self._touches = self._balls("touches", dot, 4)
         self._plane = self._scene.add_mesh_simple(
-            "/world/plane",
+            "/plane",
             vertices=np.zeros((4, 3)),
             faces=np.array([[0, 1, 2], [0, 2, 3]]),
             color=(0, 114, 178),
@@ -76,34 +80,34 @@ class Scene:
 
     def draw(self, frame: Frame) -> None:
         """Shows a frame."""
-        position, rotation = self._shape.poses(frame.qpos)
-        for handle, where, turned in zip(self._bodies, position, rotation, strict=True):
-            handle.batched_positions = where.astype(np.float32)
-            handle.batched_wxyzs = turned.astype(np.float32)
-        feet = frame.foot_position_w + np.array([0.0, 0.0, self._radius])
-        self._feet.batched_positions = feet.reshape(-1, 3).astype(np.float32)
-        lit = self._palette[frame.gait][:, None, :]
-        colours = np.where(frame.contact[..., None], lit, _DARK).reshape(-1, 3)
-        self._feet.batched_colors = linear(colours)
-        self._draw_plane(frame.touch_w[0])
         if self.follows:
             base = frame.qpos[0, :3] * np.array([1.0, 1.0, 0.0])
             far = np.linalg.norm(base - self._centre) > 3.0
             self._centre = base if far else self._centre + _FOLLOW * (base - self._centre)
             self._root.position = -self._centre
+        position, rotation = self._shape.poses(frame.qpos)
+        for handle, where, turned in zip(self._bodies, position, rotation, strict=True):
+            handle.batched_positions = (where - self._centre).astype(np.float32)
+            handle.batched_wxyzs = turned.astype(np.float32)
+        feet = frame.foot_position_w + np.array([0.0, 0.0, self._radius]) - self._centre
+        self._feet.batched_positions = feet.reshape(-1, 3).astype(np.float32)
+        lit = self._palette[frame.gait][:, None, :]
+        colours = np.where(frame.contact[..., None], lit, _DARK).reshape(-1, 3)
+        self._feet.batched_colors = linear(colours)
+        self._draw_plane(frame.touch_w[0] - self._centre)
 
-    def _draw_plane(self, touch_w: Float[np.ndarray, "4 3"]) -> None:
+    def _draw_plane(self, touch: Float[np.ndarray, "4 3"]) -> None:
         """The last touches of the first robot, and the plane through them."""
-        known = bool(np.isfinite(touch_w).all())
+        known = bool(np.isfinite(touch).all())
         self._touches.visible = self._plane.visible = known
         if not known:
             return
-        self._touches.batched_positions = touch_w.astype(np.float32)
-        self._plane.vertices = plane_corners(touch_w).astype(np.float32)
+        self._touches.batched_positions = touch.astype(np.float32)
+        self._plane.vertices = plane_corners(touch).astype(np.float32)
 
     def _balls(self, name: str, mesh: trimesh.Trimesh, count: int) -> Any:
         return self._scene.add_batched_meshes_simple(
-            f"/world/{name}",
+            f"/{name}",
             vertices=mesh.vertices,
             faces=mesh.faces,
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
