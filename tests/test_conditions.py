@@ -665,9 +665,9 @@ def test_an_unknown_graph_is_refused_with_those_there_are():
         GaitGraph.load("terran")
 
 
-def test_the_default_graph_is_the_default_condition():
-    ours = GaitGraph.of(Condition(), flat="trot", rough="bound")
-    assert GaitGraph.load("terrain") == replace(ours, statistics={"ground": HeightDifference()})
+def test_the_graph_by_terrain_is_the_condition_that_was_found_best():
+    ours = GaitGraph.of(CONDITIONS["touchdown_surprise"], flat="trot", rough="bound")
+    assert GaitGraph.load("terrain") == ours
 
 
 def test_the_way_back_may_watch_something_else():

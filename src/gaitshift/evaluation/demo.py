@@ -49,7 +49,8 @@ class DemoConfig:
     rough_gait: str = "bound"
     """The gait on rough ground."""
     condition: str = "height_difference"
-    """When to shift, by name: `height_difference`, or `paper` for its own setting."""
+    """When to shift, by name: `height_difference`, the paper's statistic with numbers of ours;
+    `touchdown_surprise`, which slopes and steps do not deceive; `paper`, with its own numbers."""
     alpha: float | None = None
     """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
     beta: float | None = None
