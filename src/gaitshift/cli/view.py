@@ -30,7 +30,7 @@ class View:
     """The ground, piece by piece with lengths in metres."""
     robots: int = 1
     """Robots on the track, 1 to 16; charts tell of the first."""
-    condition: str = "height_difference"
+    condition: str = DemoConfig.condition
     """When to shift from trot to bound and back, by name."""
     seed: int = 0
     """Seed of the ground and of the starts."""

@@ -48,9 +48,9 @@ class DemoConfig:
     """The gait on flat ground, and at the start."""
     rough_gait: str = "bound"
     """The gait on rough ground."""
-    condition: str = "height_difference"
-    """When to shift, by name: `height_difference`, the paper's statistic with numbers of ours;
-    `touchdown_surprise`, which slopes and steps do not deceive; `paper`, with its own numbers."""
+    condition: str = "touchdown_surprise"
+    """When to shift, by name: `touchdown_surprise`, which slopes and steps do not deceive;
+    `height_difference`, the paper's statistic with numbers of ours; `paper`, with its own."""
     alpha: float | None = None
     """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
     beta: float | None = None
