@@ -23,7 +23,7 @@ class ConditionState:
 
     statistic: Any
     """What its statistic remembers."""
-    statistic_back: Any
+    statistic_back: Any = None
     """What that of the way back remembers; None where it is the same."""
     k: Float[np.ndarray, " N"]
     """Counter [counts] of the rule in force."""
