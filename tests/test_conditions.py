@@ -65,7 +65,8 @@ def random_signals(rng, n, step):
         foot_position_b=FEET + rng.normal(scale=0.1, size=(n, 4, 3)),
         gravity_b=gravity / np.linalg.norm(gravity, axis=1, keepdims=True),
         time=PERIOD * step,
-        yaw=0.005 * rng.normal(size=n),  # a robot thrown off its heading would be told nothing
+        # No two alike, and steady: a robot that is thrown off its heading is told nothing.
+        yaw=np.linspace(-2.0, 2.0, n) + 0.005 * rng.normal(size=n),
         velocity_b=rng.normal(size=(n, 3)),
         angular_velocity_b=rng.normal(size=(n, 3)),
         power=rng.random(n) * 300,
@@ -93,16 +94,14 @@ def test_robots_one_by_one_are_the_batch_bit_for_bit(kind):
     few = {"memory": 1} if kind == "touchdown_surprise" else {}  # they seldom tread new ground
     rng, statistic = np.random.default_rng(3), STATISTICS[kind](**few)
     batch, singles = statistic.start(5), [statistic.start(1) for _ in range(5)]
-    known = np.zeros((5, statistic.width), dtype=bool)
     for step in range(1000):
         signals = random_signals(rng, 5, step)
         batch, values = statistic.step(batch, signals)
-        known |= ~np.isnan(values)
         assert values.shape == (5, statistic.width)
         for robot in range(5):
             singles[robot], alone = statistic.step(singles[robot], signals.of(np.array([robot])))
             np.testing.assert_array_equal(alone[0], values[robot])
-    assert known.all(), "ten seconds are enough for all"
+    assert not np.isnan(values).any(), "ten seconds are enough for all"
 
 
 @pytest.mark.parametrize("kind", STATISTICS)

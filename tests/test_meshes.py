@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from gaitshift.geometry import Shape, has_meshes, meshes, put_on
+from gaitshift.geometry import Shape, collada, has_meshes, meshes, put_on
 from gaitshift.robot import ANYMAL_B, Robot
 
 needs_meshes = pytest.mark.skipif(
@@ -90,11 +90,11 @@ def test_they_are_converted_once(cache: Path, monkeypatch: pytest.MonkeyPatch):
     (kept,) = cache.iterdir()
     assert metadata.version("example-robot-data") in kept.name
 
-    def refuse(urdf: Path) -> list[meshes.Part]:
+    def refuse(urdf: Path) -> list[collada.Part]:
         raise AssertionError("converted again")
 
     with monkeypatch.context() as patched:
-        patched.setattr(meshes, "_convert", refuse)
+        patched.setattr(meshes, "convert", refuse)
         second = _dressed()
     np.testing.assert_allclose(first.mesh_vert, second.mesh_vert, atol=1e-6)
     kept.write_bytes(b"not a cache")

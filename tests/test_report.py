@@ -121,6 +121,14 @@ def test_the_page_asks_for_nothing_and_tells_what_happened(page):
     assert len(json.loads(raw)["shifts"]) >= 1
 
 
+def test_a_film_stands_on_the_page_under_a_heading_as_all_sections_do(log, tmp_path):
+    (tmp_path / "film.mp4").write_bytes(b"a film")
+    write_report(log, tmp_path / "page.html", video=tmp_path / "film.mp4")
+    text = (tmp_path / "page.html").read_text()
+    assert re.findall("<h2>(.*?)</h2>", text) == ["Gaits", "Shifts", "Film", "What made it"]
+    assert base64.b64encode(b"a film").decode() in text
+
+
 def test_the_player_was_made_from_its_sources():
     """`make player` bundles web/ and writes the sum of its sources into the bundle."""
     total = hashlib.sha256()

@@ -272,8 +272,13 @@ def served(tmp_path):
 def opened(browser, address):
     """A page on the address, and what went wrong on it."""
     page, wrong = browsing.opened(browser, address)
-    page.get_by_text("real time").first.wait_for()
+    wait_for_status(page)
     return page, wrong
+
+
+def wait_for_status(page):
+    page.get_by_text("real time").first.wait_for()
+    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
 
 
 def status(page):
@@ -295,15 +300,13 @@ def wait_until(true, seconds=150.0):
 def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
     process, address = served("--track", "flat@200")
     page, wrong = opened(browser, address)
-    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
     first = status(page)
     assert first[0] == "trot"
     wait_until(lambda: status(page)[1] > first[1] + 1.0)
     page.get_by_role("button", name="pace", exact=True).click()
-    wait_until(lambda: status(page)[0] == "pace")
+    wait_until(gait_is(page, "pace"))
     page.reload(wait_until="commit")
-    page.get_by_text("real time").first.wait_for()
-    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
+    wait_for_status(page)
     assert status(page)[0] == "pace", "it goes on as it was"
     assert not wrong
     process.send_signal(signal.SIGINT)
@@ -329,7 +332,6 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
     """No feet differ by 0.3 m on this ground, and nearly all steps differ by 5 mm."""
     _, address = served("--track", "perlin:0.1@300")
     page, wrong = opened(browser, address)
-    wait_until(lambda: page.locator("p", has_text=" · ").count() > 0)
     enter(page, "α [m]", 0.3)
     enter(page, "α' [m]", 0.3)
     wait_until(gait_is(page, "trot"))

@@ -17,7 +17,8 @@ QUICK_RESULTS, QUICK_RUNS = Path("runs/reproduce-quick/results"), Path("runs/rep
 class Reproduce:
     """Run the paper's recipe again, for trot, bound and pace over five seeds, and its ablations.
 
-    Broken off at any time, the same command goes on where it stopped. About three hours on 2 cores.
+    Broken off at any time, the same command goes on where it stopped. It takes three to four hours
+    on 2 cores.
     """
 
     only: Annotated[tuple[str, ...], names_option] = ()

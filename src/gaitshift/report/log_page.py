@@ -89,7 +89,7 @@ def _shifts(log: Log, robot: int) -> list[Row]:
         gait_spans(log, robot), gait_spans(log, robot)[1:], strict=False
     ):
         x = float(log.qpos[span.entry, robot, 0])
-        k = f"{log.k[span.entry, robot]:.0f} of {log.threshold[span.entry, robot]:.0f}"
+        k = f"{log.k[span.entry, robot]:.4g} of {log.threshold[span.entry, robot]:.4g}"
         cells = (f"{span.begin:.2f} s", f"{x:.2f} m", title_of(before), title_of(after), k)
         rows.append((cells, max(span.begin - 1.0, 0.0)))
     return rows
@@ -126,7 +126,7 @@ def _video(path: Path | None) -> str:
         return ""
     data = base64.b64encode(path.read_bytes()).decode("ascii")
     return (
-        "<h2>Film</h2><video controls muted playsinline preload='auto' "
+        "<video controls muted playsinline preload='auto' "
         f"src='data:video/mp4;base64,{data}'></video>"
     )
 

@@ -37,7 +37,8 @@ def write_page(
     body = "".join(f"<h2>{html.escape(head)}</h2>{content}" for head, content in shown)
     data = "".join(_json(f"run{i}", walk, " data-walk") for i, (_, walk) in enumerate(walks))
     if course is not None:
-        body = f"<h2>Course of the training</h2><div id='course'></div>{body}"
+        told = "<p>Dotted lines are ends of stages; the wheel zooms, a double click shows all.</p>"
+        body = f"<h2>Course of the training</h2><div id='course'></div>{told}{body}"
         data += _json("progress", course)
     parts = {
         "TITLE": html.escape(f"{title} · gaitshift"),

@@ -27,10 +27,8 @@ def write_training_report(
         summary: a sentence on it.
 
     Raises:
-        GaitshiftError: a file of the run that cannot be read, or nothing to show.
+        GaitshiftError: a file of the run that cannot be read.
     """
-    if not walks:
-        raise GaitshiftError(f"{folder} holds no policy to show")
     for _, log in walks:
         check_kind(log)
     write_page(
@@ -89,7 +87,7 @@ def _facts(path: Path) -> dict[str, str]:
         stages = [f"{stage['name']} {stage['iterations']}" for stage in recipe["stages"]]
         return {
             "command": config["command"],
-            "seed": config["seed"],
+            "seed": str(config["seed"]),
             "iterations": ", ".join(stages),
             "robots × steps an iteration": f"{recipe['robots']} × {recipe['steps']}",
             **{f"{name} then": str(one) for name, one in config["versions"].items()},
