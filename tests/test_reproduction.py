@@ -3,6 +3,8 @@
 import csv
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,7 +27,8 @@ from gaitshift.reproduction.plan import Plan
 from gaitshift.reproduction.pool import train_all
 from gaitshift.reproduction.results import Results, Seeds
 from gaitshift.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER, REFERENCE
-from gaitshift.reproduction.tables import curve_rows
+from gaitshift.reproduction.tables import curve_rows, run_rows, write
+from gaitshift.reproduction.told import Told
 from gaitshift.reproduction.training import FAILED, is_over, train
 from gaitshift.terrain import flat
 from gaitshift.training.recipe import Recipe
@@ -297,14 +300,52 @@ def test_an_ablation_is_held_against_as_many_seeds_and_iterations():
     assert "**u and δ hidden** 3 of 3 walk (median from iteration 250)" in finding.measured
 
 
-def test_curves_are_means_over_the_seeds_that_got_so_far():
-    courses = [course(10, start=-20.0, zero=6, end=10.0), course(7, start=-10.0, zero=99)]
-    results = Results(plan=Plan(), seeds={("paper", "pace"): seeds("paper", "pace", courses)})
-    rows = list(curve_rows(results))
-    assert [(r["iteration"], r["reward_mean"], r["reward_sd"], r["seeds"]) for r in rows] == [
-        (5, -15.0, 5.0, 2),
-        (10, 10.0, 0.0, 1),
-    ]
+def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
+    """Landmarks and findings from the table are those from the runs, digit by digit."""
+    table = like_the_paper() | {
+        ("blind", "trot"): seeds("blind", "trot", [course(200, walks=61)] * 2, broken=1),
+    }
+    first = Results(plan=Plan(), seeds=table)
+    write(run_rows(first), tmp_path / "runs.csv")
+    write(list(curve_rows(first)), tmp_path / "curves.csv")
+    told = Told.read(Plan(), tmp_path)
+    again = Results.read(Plan(), tmp_path / "none", told)
+    assert findings(again) == findings(first)
+    assert list(curve_rows(again)) == list(curve_rows(first))
+    assert told.broken == {"blind-trot-2"}
+    assert again.seeds["paper", "pace"].courses[1].walks_at == 86
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "says"),
+    [
+        ("runs.csv", "setting,", "set,", "runs.csv is damaged: 'setting'"),
+        ("curves.csv", "blind,trot,0,7,", "blind,trot,9,7,", "200 lines of blind-trot-0"),
+        ("curves.csv", "26.00", "2_6.0?", "curves.csv is damaged: could not convert"),
+    ],
+)
+def test_a_damaged_report_is_named(name, old, new, says, tmp_path):
+    table = {("blind", "trot"): seeds("blind", "trot", [course(200, walks=61)] * 3)}
+    results = Results(plan=Plan(), seeds=table)
+    write(run_rows(results), tmp_path / "runs.csv")
+    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    path = tmp_path / name
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(GaitshiftError, match=re.escape(says)):
+        Told.read(Plan(), tmp_path)
+
+
+def test_a_report_of_another_recipe_is_not_added_to(tmp_path):
+    plan = Plan()
+    results = Results(plan=plan, seeds=like_the_paper())
+    write(run_rows(results), tmp_path / "runs.csv")
+    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    assert len(Told.read(plan, tmp_path).courses) == 15
+    assert len(Told.read(replace(plan, seeds=2), tmp_path).courses) == 6, "as far as it is planned"
+    with pytest.raises(GaitshiftError, match="paper-trot-0 with another recipe"):
+        Told.read(Plan.tiny(), tmp_path)
+    assert not Told.read(plan, tmp_path / "nothing").courses
 
 
 # Figures ----------------------------------------------------------------------------------------
@@ -414,6 +455,17 @@ def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
         with (runs / job.name / "progress.csv").open(newline="") as file:
             iterations = [int(row["iteration"]) for row in csv.DictReader(file)]
         assert iterations == list(range(1, job.recipe.iterations + 1))
+
+    # Folders that are gone, and one run that the report does not tell of.
+    for job in Plan.tiny().jobs:
+        shutil.rmtree(runs / job.name)
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    lines = (out / "runs.csv").read_text().splitlines(keepends=True)
+    (out / "runs.csv").write_text("".join(line for line in lines if "curriculum" not in line))
+    main([*arguments, "--add", "--json"])
+    assert json.loads(capsys.readouterr().out) == told
+    assert [path.name for path in runs.iterdir()] == ["curriculum-trot-0"]
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ QUICK_RESULTS, QUICK_RUNS = Path("runs/reproduce-quick/results"), Path("runs/rep
 class Reproduce:
     """Run the paper's recipe again, for trot, bound and pace over five seeds, and its ablations.
 
-    Broken off at any time, the same command goes on where it stopped. It takes three to four hours
-    on 2 cores.
+    Broken off at any time, the same command goes on where it stopped. It takes about three
+    hours on 2 cores.
     """
 
     only: Annotated[tuple[str, ...], names_option] = ()
@@ -28,6 +28,9 @@ class Reproduce:
     """Folder for README.md, figures and CSV; docs/results/paper by default."""
     runs: Path | None = None
     """Folder for the runs; runs/reproduce by default."""
+    add: bool = False
+    """Count runs that the report in --out tells of as done, and add to it; their folders may be
+    gone, or on another machine."""
     jobs: int = os.cpu_count() or 1
     """Runs at a time, each on one core; by default as many as there are cores."""
     quick: bool = False
@@ -44,6 +47,7 @@ class Reproduce:
             from gaitshift.reproduction.pool import train_all
             from gaitshift.reproduction.report import write_report
             from gaitshift.reproduction.results import Results
+            from gaitshift.reproduction.told import Told
         except ImportError as error:
             raise GaitshiftError(
                 f"training needs the package '{error.name}'; install gaitshift[train]"
@@ -56,11 +60,12 @@ class Reproduce:
             if folder.exists() and not folder.is_dir():
                 raise GaitshiftError(f"{folder} is a file; a folder would be right")
         plan = Plan.tiny(self.seed) if self.quick else Plan(seed=self.seed)
-        wanted = plan.select(self.only)
+        told = Told.read(plan, out) if self.add else Told()
+        wanted = [job for job in plan.select(self.only) if job.name not in told.courses]
         with progress(f"{len(wanted)} runs") as report:
             train_all(wanted, runs, self.jobs, report)
         with progress("judging") as report:
-            told = write_report(Results.read(plan, runs), runs, out, report)
+            told = write_report(Results.read(plan, runs, told), runs, out, told, report)
         _say_broken(told)
         if self.json:
             emit_json(told)

@@ -1,7 +1,7 @@
 """The course of runs: what each iteration was like, and the iterations that matter."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,9 @@ HELD_FOR = 10
 LATE_SHARE = 0.1
 """Share of a course that its end is averaged over."""
 
-_COLUMNS = ("reward", "speed", "survival", "changes_per_s", "stance_fraction")
+DECIMALS = {"reward": 2, "speed": 3, "survival": 3, "changes_per_s": 2, "stance_fraction": 3}
+"""Columns of a course and their decimals, in memory as in tables: so a course that is read back
+from a table says the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,22 +47,32 @@ class Course:
         """The course in a `progress.csv`."""
         try:
             with path.open(newline="") as file:
-                rows = list(csv.DictReader(file))
-            return cls(**{name: np.array([float(row[name]) for row in rows]) for name in _COLUMNS})
+                return cls.of(list(csv.DictReader(file)))
         except (OSError, KeyError, ValueError, TypeError) as error:
             raise GaitshiftError(f"{path} is no progress of a run: {error}") from error
 
     @classmethod
+    def of(cls, rows: Sequence[Mapping[str, str]]) -> "Course":
+        """The course in lines of a table, one an iteration.
+
+        Raises:
+            KeyError: a column is missing.
+            ValueError: an entry is no number.
+        """
+        columns = {name: np.array([float(row[name]) for row in rows]) for name in DECIMALS}
+        return cls(**{name: columns[name].round(DECIMALS[name]) for name in DECIMALS})
+
+    @classmethod
     def empty(cls) -> "Course":
         """The course of a run that broke down in its first iteration."""
-        return cls(**{name: np.zeros(0) for name in _COLUMNS})
+        return cls(**{name: np.zeros(0) for name in DECIMALS})
 
     def __len__(self) -> int:
         return len(self.reward)
 
     def cut(self, iterations: int) -> "Course":
         """The first of its iterations."""
-        return Course(**{name: getattr(self, name)[:iterations] for name in _COLUMNS})
+        return Course(**{name: getattr(self, name)[:iterations] for name in DECIMALS})
 
     def late(self, column: str) -> float:
         """Mean of a column over the last tenth."""

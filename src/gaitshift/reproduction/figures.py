@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gaitshift.command import PAPER_SPEED
+from gaitshift.log import Log
 from gaitshift.plots import contact_diagram
 from gaitshift.plots.learning import Courses, Landmarks, comparison_curves, reward_curves
 from gaitshift.reproduction.judging import Judged, middle
@@ -29,9 +30,11 @@ def draw(results: Results, judged: list[Judged], out: Path) -> list[str]:
     for gait in rewards:
         shown = middle(judged, gait)
         if shown is not None:
-            name = f"contacts-{gait}.png"
-            _draw_contacts(shown, out / name)
-            drawn.append(name)
+            path = out / f"contacts-{gait}.png"
+            if shown.log is not None:
+                _draw_contacts(shown.log, path)
+            if path.is_file():  # drawn now, or by an earlier report
+                drawn.append(path.name)
     panels = _panels(results)
     if panels:
         comparison_curves(panels, out / COMPARISONS, aim=PAPER_SPEED)
@@ -39,9 +42,8 @@ def draw(results: Results, judged: list[Judged], out: Path) -> list[str]:
     return drawn
 
 
-def _draw_contacts(judged: Judged, path: Path) -> None:
+def _draw_contacts(log: Log, path: Path) -> None:
     """The last two seconds of the first robot that is still on its feet (else of the first)."""
-    log = judged.log
     upright = (~log.fallen[-1]).nonzero()[0]
     robot = int(upright[0]) if upright.size else 0
     end = float(log.time[-1])

@@ -1,6 +1,6 @@
 """Trained policies of the paper's setting, judged without exploration noise."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -10,6 +10,7 @@ from gaitshift import policy
 from gaitshift.evaluation import EvaluationConfig, evaluate
 from gaitshift.log import Log
 from gaitshift.reproduction.results import Results
+from gaitshift.reproduction.told import Told
 from gaitshift.training.run import POLICY
 
 FIGURES = (
@@ -33,24 +34,31 @@ class Judged:
     """Seed of its training."""
     walks_at: int | None
     """Iteration of its training from which it walked."""
-    figures: dict[str, float | None]
+    figures: Mapping[str, float | None]
     """`FIGURES` by name; None what cannot be told of a robot that fell at once."""
-    log: Log
-    """The walk itself."""
+    log: Log | None
+    """The walk itself; None of a policy that an earlier report judged."""
 
 
 def judge(
-    results: Results, runs: Path, report: Callable[[int, int], None] = lambda done, total: None
+    results: Results,
+    runs: Path,
+    told: Told,
+    report: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Judged]:
-    """Lets every policy of the paper's setting walk on flat ground."""
+    """Lets every policy of the paper's setting walk on flat ground, but for those told of."""
     wanted = list(_policies(results))
     judged: list[Judged] = []
     plan = results.plan
     config = EvaluationConfig(episodes=plan.robots, seconds=plan.seconds, seed=plan.seed)
     for gait, seed, walks_at, name in wanted:
-        figures, log = evaluate(policy.load(runs / name / POLICY), config)
-        told = {key: _one(figures[key]) for key in FIGURES}
-        judged.append(Judged(gait=gait, seed=seed, walks_at=walks_at, figures=told, log=log))
+        path, log = runs / name / POLICY, None
+        if path.is_file():
+            measured, log = evaluate(policy.load(path), config)
+            figures: Mapping[str, float | None] = {key: _one(measured[key]) for key in FIGURES}
+        else:
+            figures = told.figures.get(name, dict.fromkeys(FIGURES))
+        judged.append(Judged(gait=gait, seed=seed, walks_at=walks_at, figures=figures, log=log))
         report(len(judged), len(wanted))
     return judged
 

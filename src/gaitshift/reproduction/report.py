@@ -12,6 +12,7 @@ from gaitshift.reproduction.findings import Finding, findings
 from gaitshift.reproduction.judging import Judged, judge
 from gaitshift.reproduction.results import Results
 from gaitshift.reproduction.settings import LOCKOUT
+from gaitshift.reproduction.told import CURVES, GAITS, RUNS, Told
 
 README = "README.md"
 
@@ -25,17 +26,30 @@ def write_report(
     results: Results,
     runs: Path,
     out: Path,
+    told: Told | None = None,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Writes all that the runs at hand say into `out`; gives the same as plain data."""
+    """Writes all that the runs at hand say into `out`; gives the same as plain data.
+
+    Args:
+        results: the runs that are over.
+        runs: their folders.
+        out: the folder of the report.
+        told: runs that an earlier report tells of, whose folders may be gone.
+        report: called with the policies judged and those in all.
+    """
     if not results.seeds:
         raise GaitshiftError(f"{runs} holds no run that is over, so there is nothing to tell")
     out.mkdir(parents=True, exist_ok=True)
-    judged = judge(results, runs, report)
+    judged = judge(results, runs, told or Told(), report)
     found = findings(results)
     gaits, ablations = tables.gait_rows(judged), tables.ablation_rows(results)
-    curves = list(tables.curve_rows(results))
-    parts = {tables.GAITS: gaits, tables.ABLATED_RUNS: ablations, tables.CURVES: curves}
+    parts = {
+        RUNS: tables.run_rows(results),
+        GAITS: gaits,
+        tables.ABLATED_RUNS: ablations,
+        CURVES: list(tables.curve_rows(results)),
+    }
     written = [name for name, rows in parts.items() if rows]
     for name in written:
         tables.write(parts[name], out / name)

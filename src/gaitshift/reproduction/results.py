@@ -10,6 +10,7 @@ from gaitshift.reproduction.courses import WALKING_CHANGES, WALKING_SPEED, Cours
 from gaitshift.reproduction.landmarks import GAITS
 from gaitshift.reproduction.plan import ABLATED, Job, Plan
 from gaitshift.reproduction.settings import ABLATIONS, PAPER
+from gaitshift.reproduction.told import Told
 from gaitshift.reproduction.training import FAILED, is_over
 from gaitshift.training.run import PROGRESS
 
@@ -81,22 +82,27 @@ class Results:
     """By name of setting and gait; what has no run that is over is missing."""
 
     @classmethod
-    def read(cls, plan: Plan, runs: Path) -> "Results":
-        """Reads the progress of every run of the plan that is over."""
+    def read(cls, plan: Plan, runs: Path, told: Told | None = None) -> "Results":
+        """Reads the progress of every run of the plan that is over, or that a report tells of."""
+        told = told or Told()
         found: dict[tuple[str, str], Seeds] = {}
         for job in plan.jobs:
             folder = runs / job.name
-            if not is_over(job, folder):
+            if is_over(job, folder):
+                progress = folder / PROGRESS
+                course = Course.read(progress) if progress.is_file() else Course.empty()
+                broken = (folder / FAILED).is_file()
+            elif job.name in told.courses:
+                course, broken = told.courses[job.name], job.name in told.broken
+            else:
                 continue
             key = (job.setting.name, job.gait)
             sofar = found.get(key, Seeds(jobs=(), courses=(), broken=()))
-            progress = folder / PROGRESS
-            course = Course.read(progress) if progress.is_file() else Course.empty()
             found[key] = replace(
                 sofar,
                 jobs=(*sofar.jobs, job),
                 courses=(*sofar.courses, course),
-                broken=(*sofar.broken, (folder / FAILED).is_file()),
+                broken=(*sofar.broken, broken),
             )
         return cls(plan=plan, seeds=found)
 

@@ -5,17 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from gaitshift.reproduction.courses import DECIMALS
 from gaitshift.reproduction.judging import Judged
 from gaitshift.reproduction.plan import ABLATED
 from gaitshift.reproduction.results import Results, Seeds
-from gaitshift.reproduction.settings import ABLATIONS, REFERENCE, Setting
+from gaitshift.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
+from gaitshift.reproduction.told import fingerprint
 
-GAITS, ABLATED_RUNS, CURVES = "gaits.csv", "ablations.csv", "curves.csv"
-
-EVERY = 5
-"""Iterations from one line of `curves.csv` to the next."""
+ABLATED_RUNS = "ablations.csv"
 
 Row = dict[str, Any]
 
@@ -24,6 +21,7 @@ def gait_rows(judged: list[Judged]) -> list[Row]:
     """A row a policy of the paper's setting: from when it walked, and how it walks."""
     return [
         {
+            "setting": PAPER,
             "gait": one.gait,
             "seed": one.seed,
             "walks_from_iteration": one.walks_at,
@@ -41,18 +39,33 @@ def ablation_rows(results: Results) -> list[Row]:
     return rows + [_ablation_row(settings[name], seeds) for name, seeds in results.ablations()]
 
 
+def run_rows(results: Results) -> list[Row]:
+    """A row a run: how far it came, and which recipe it is of."""
+    return [
+        {
+            "setting": job.setting.name,
+            "gait": job.gait,
+            "seed": job.seed,
+            "iterations": len(course),
+            "broke_down": broken,
+            "recipe": fingerprint(job),
+        }
+        for seeds in results.seeds.values()
+        for job, course, broken in zip(seeds.jobs, seeds.courses, seeds.broken, strict=True)
+    ]
+
+
 def curve_rows(results: Results) -> Iterator[Row]:
-    """Mean and standard deviation over seeds, every few iterations, of every setting and gait."""
+    """A row an iteration of every run."""
     for (setting, gait), seeds in results.seeds.items():
-        longest = max(map(len, seeds.courses))
-        for index in range(EVERY - 1, longest, EVERY):
-            there = [course for course in seeds.courses if len(course) > index]
-            row: Row = {"setting": setting, "gait": gait, "iteration": index + 1}
-            for name in ("reward", "speed"):
-                values = [getattr(course, name)[index] for course in there]
-                row[f"{name}_mean"] = round(float(np.mean(values)), 4)
-                row[f"{name}_sd"] = round(float(np.std(values)), 4)
-            yield {**row, "seeds": len(there)}
+        for job, course in zip(seeds.jobs, seeds.courses, strict=True):
+            run: Row = {"setting": setting, "gait": gait, "seed": job.seed}
+            columns = [
+                [f"{value:.{digits}f}" for value in getattr(course, name)]
+                for name, digits in DECIMALS.items()
+            ]
+            for index, entries in enumerate(zip(*columns, strict=True)):
+                yield {**run, "iteration": index + 1, **dict(zip(DECIMALS, entries, strict=True))}
 
 
 def write(rows: list[Row], path: Path) -> None:

@@ -1,5 +1,6 @@
 """rsl_rl's PPO on a `GaitEnv`: one object that collects and learns an iteration at a time."""
 
+from itertools import chain
 from typing import Any, cast
 
 import numpy as np
@@ -133,7 +134,7 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
     critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
     symmetric = config.mirror and env.machine.mirrored_states() is not None
-    return PPO(
+    ppo = PPO(
         actor,
         critic,
         storage,
@@ -149,6 +150,10 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         desired_kl=config.desired_kl,
         symmetry_cfg=_symmetry(env) if symmetric else None,
     )
+    if config.fused_adam:
+        weights = chain(actor.parameters(), critic.parameters())
+        ppo.optimizer = torch.optim.Adam(weights, lr=config.learning_rate, fused=True)
+    return ppo
 
 
 def _symmetry(env: GaitEnv) -> dict[str, Any]:
