@@ -129,12 +129,16 @@ def test_a_film_stands_on_the_page_under_a_heading_as_all_sections_do(log, tmp_p
     assert base64.b64encode(b"a film").decode() in text
 
 
-def test_the_player_was_made_from_its_sources():
-    """`make player` bundles web/ and writes the sum of its sources into the bundle."""
+@pytest.mark.parametrize(
+    ("bundle", "own"),
+    [("player.js", ("player.js", "scene.js", "charts.js")), ("figures.js", ("figures.js",))],
+)
+def test_scripts_were_made_from_their_sources(bundle, own):
+    """`make player` bundles web/ and writes the sum of a bundle's sources into it."""
     total = hashlib.sha256()
-    for name in ("player.js", "scene.js", "charts.js", "package.json"):
+    for name in (*own, "theme.js", "unpack.js", "package.json"):
         total.update((ROOT / "web" / name).read_bytes())
-    head = (ROOT / "src/gaitshift/report/player.js").read_text()[:200]
+    head = (ROOT / "src/gaitshift/report" / bundle).read_text()[:200]
     assert total.hexdigest() in head, "run: make player"
 
 

@@ -654,10 +654,14 @@ ORACLE = Recipe(
 
 
 def learned_values(env, recipe, observations, *, iterations):
-    """V of the observations, as the critic has it after some iterations."""
+    """V of the observations, as the critic has it after some iterations; the actor stays as it is.
+
+    Where every action is worth the same an actor that learns strays, and with it what is seen.
+    """
     torch.set_num_threads(1)
     torch.manual_seed(0)
     learner = Learner(env, recipe)
+    learner.ppo.actor.requires_grad_(False)
     for _ in range(iterations):
         learner.iterate()
     seen = torch.from_numpy(np.asarray(observations, dtype=np.float32))
@@ -686,7 +690,7 @@ def test_a_reward_of_one_for_ever_is_worth_its_geometric_sum_though_episodes_are
     seen = 0.5 * np.random.default_rng(0).normal(size=(400, 12))
     values = learned_values(env, recipe, seen, iterations=60)
     assert (env.falls, env.cuts) == (0, 16 * 60 * 16 // 5)
-    assert values.mean().item() == pytest.approx(10.0, rel=0.1)
+    assert values.mean().item() == pytest.approx(10.0, rel=0.02)
 
 
 class Toss(GaitEnv):
@@ -840,16 +844,16 @@ def test_a_gait_with_a_leading_side_and_a_recipe_without_mirror_learn_from_what_
 
 
 @pytest.mark.slow
-def test_forty_iterations_are_enough_to_find_the_cycle_of_a_gait(tmp_path):
+def test_sixty_iterations_are_enough_to_find_the_cycle_of_a_gait(tmp_path):
     """The default recipe, cut short: nothing in it is of another size."""
-    recipe = Recipe(threads=1).with_iterations(40)
+    recipe = Recipe(threads=1).with_iterations(60)
     reported = []
     create(tmp_path / "run", seed=0, recipe=recipe).train(reported.append)
 
     def mean(some, name):
         return np.mean([row[name] for row in some])
 
-    early, late = reported[:1], reported[-5:]
+    early, late = reported[:1], reported[-10:]
     # A dwell of 20 steps allows 5 changes a second.
     assert mean(early, "changes_per_s") < 1.5
     assert mean(late, "changes_per_s") > 3.0

@@ -1,5 +1,8 @@
 // Signals over time, each in a row of its own on one axis; hover to read, drag to go there, wheel to zoom.
 // Without `seek` there is nowhere to go: the course of a training, over its iterations.
+import { shade, style } from "./theme.js";
+import { ticks } from "./unpack.js";
+
 const LEFT = 58, RIGHT = 12, ROW = 92, BARS = 76, GAP = 30, AXIS = 34;
 
 export function charts(holder, data, seek = null) {
@@ -15,18 +18,6 @@ export function charts(holder, data, seek = null) {
   const heights = rows.map((row) => (row.kind === "contacts" ? BARS : ROW));
   const high = heights.reduce((sum, h) => sum + h + GAP, 0) + AXIS;
   const index = (t) => Math.min(Math.max(Math.round(t / data.period) - 1, 0), data.time.length - 1);
-
-  const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
-  /** A colour as it can be told from the paper: dark ones are lightened on dark paper. */
-  function shade(colour) {
-    if (colour === "ink") return style("--ink");
-    if (style("--dark") !== "1") return colour;
-    const parts = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
-    const light = (0.21 * parts[0] + 0.72 * parts[1] + 0.07 * parts[2]) / 255;
-    const mix = Math.max(0, 0.45 - light);
-    return `rgb(${parts.map((p) => Math.round(p + (255 - p) * mix)).join(" ")})`;
-  }
 
   function draw() {
     const wide = holder.clientWidth, ratio = Math.min(devicePixelRatio, 2);
@@ -200,13 +191,4 @@ export function charts(holder, data, seek = null) {
   }
 
   return { show, whole };
-}
-
-/** Round numbers between two, about so many. */
-function ticks(low, high, about) {
-  const raw = (high - low) / Math.max(about, 1), power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((f) => f * power).find((s) => s >= raw);
-  const found = [];
-  for (let v = Math.ceil(low / step - 1e-9) * step; v <= high + 1e-9 * step; v += step) found.push(v);
-  return found;
 }

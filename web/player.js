@@ -2,28 +2,13 @@
 // Reads what `gaitshift.report` wrote into the page; see there for the meaning of each entry.
 import { scene } from "./scene.js";
 import { charts } from "./charts.js";
+import { themed } from "./theme.js";
+import { unpack } from "./unpack.js";
 
 const walks = document.querySelectorAll("script[data-walk]");
 const which = Math.min(Number(location.hash.slice(1)) || 0, walks.length - 1);
 const run = JSON.parse(walks[which].textContent);
-const TYPES = { f4: Float32Array, u4: Uint32Array, u1: Uint8Array, i2: Int16Array };
-
-/** An array that Python wrote as { type, shape, base64 }. */
-function unpack({ type, data }) {
-  const bytes = Uint8Array.from(atob(data), (c) => c.charCodeAt(0));
-  return new TYPES[type](bytes.buffer);
-}
-
-function unpackAll(value) {
-  if (Array.isArray(value)) return value.map(unpackAll);
-  if (value && typeof value === "object") {
-    if (value.data !== undefined && value.type !== undefined) return unpack(value);
-    return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, unpackAll(v)]));
-  }
-  return value;
-}
-
-const data = unpackAll(run);
+const data = unpack(run);
 const state = { time: 0, plays: false, pace: 1, end: data.time[data.time.length - 1] };
 const at = () => Math.min(Math.round(state.time / data.period), data.time.length - 1);
 
@@ -37,7 +22,7 @@ const view = scene(document.getElementById("scene"), data);
 const plots = charts(document.getElementById("charts"), data, seek);
 
 const course = document.getElementById("course");
-const learning = course && charts(course, unpackAll(JSON.parse(document.getElementById("progress").textContent)));
+const learning = course && charts(course, unpack(JSON.parse(document.getElementById("progress").textContent)));
 const choice = document.getElementById("walk");
 if (choice) {
   choice.value = which;
@@ -85,22 +70,12 @@ document.addEventListener("keydown", (e) => {
   if (e.key === "ArrowRight") seek(state.time + 0.1);
   if (e.key === "ArrowLeft") seek(state.time - 0.1);
 });
-const theme = document.getElementById("theme");
-theme.addEventListener("click", () => {
-  const root = document.documentElement;
-  const dark = getComputedStyle(root).getPropertyValue("--dark").trim() === "1";
-  root.dataset.theme = dark ? "light" : "dark";
-  recolour();
-});
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  recolour();
-});
-
 function recolour() {
   view.recolour();
   plots.show(state.time);
   if (learning) learning.show(null);
 }
+themed(recolour);
 
 let before = performance.now();
 function tick(now) {

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -15,7 +15,7 @@ from gaitshift.errors import GaitshiftError
 if TYPE_CHECKING:
     from gaitshift.identification.finding import Judged, Recordings
 
-ROC = "roc.png"
+ROC, PAGE = "roc.png", "index.html"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,7 +25,8 @@ class Identify:
     Logs are npz files of `gaitshift record`, `demo` and `evaluate`, or tables (CSV, Parquet) of any
     robot with the columns time, rough, contact_FL, foot_FL_x and so on. Every condition is replayed
     over a grid of α, β and leaks; the soonest detection that never shifts on smooth ground is
-    chosen. Writes README.md, conditions.csv, courses.csv, a map a condition, and ROC curves.
+    chosen. Writes README.md, conditions.csv, courses.csv, a map a condition, ROC curves, and all of
+    it as one page to hover over and zoom into, index.html.
     """
 
     logs: Annotated[tuple[Path, ...], tyro.conf.Positional]
@@ -74,7 +75,7 @@ class Identify:
         named = candidates([name for name in self.condition if name not in (NAME, "all")])
         wanted = list(CANDIDATES if everything else named)
         check_sources((*self.logs, *self.held_out))
-        check_folder(self.out, overwrite=self.overwrite, ours=(*reports.FILES, ROC))
+        check_folder(self.out, overwrite=self.overwrite, ours=(*reports.FILES, ROC, PAGE))
         read = _reader(self.logs)
         classifier: RoughnessClassifier | None = None
         if everything or NAME in self.condition:
@@ -100,17 +101,24 @@ class Identify:
         judges = self.held_out or self.logs
         judged = judge(tuned, _reader(judges), report=_tell("judging"))
         self.out.mkdir(parents=True, exist_ok=True)
+        command = shlex.join(["gaitshift", *sys.argv[1:]])
         rows = reports.write_report(
             judged,
             self.out,
-            command=shlex.join(["gaitshift", *sys.argv[1:]]),
+            command=command,
             held_out=bool(self.held_out),
             pictures=_draw(judged, self.out),
         )
+        from gaitshift.report import write_identification_page  # matplotlib is slow to import
+
+        title, words = reports.introduction(judged, bool(self.held_out))
+        page = self.out / PAGE
+        write_identification_page(judged, page, title=title, words=words, command=command)
         if self.json:
             emit_json({"out": str(self.out), "conditions": rows})
         else:
-            emit_table(f"conditions, by {len(judges)} logs; report in {self.out}", _table(rows))
+            cells = [reports.CONDITIONS_HEAD, *map(reports.condition_cells, rows)]
+            emit_table(f"conditions, by {len(judges)} logs; report in {self.out}", cells)
 
 
 def _reader(paths: Sequence[Path]) -> "Recordings":
@@ -148,20 +156,3 @@ def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
 def _area(one: "Judged", course: str) -> float:
     area = one.area(course)
     return 1.0 if area is None else area[0]
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
-    head = ("condition", "α", "β", "leak", "noticed", "after", "false shifts", "area")
-    return [head] + [
-        (
-            row["condition"],
-            f"{row['alpha']:.3g} {row['unit']}".strip(),
-            f"{row['beta']:g}",
-            f"{row['leak']:g}",
-            f"{row['detected']} of {row['came']}",
-            "–" if row["delay_m"] is None else f"{row['delay_m']:.2f} m",
-            f"{row['false_shifts']} in {row['km']:.2f} km",
-            "–" if row["area"] is None else f"{row['area']:.4f}",
-        )
-        for row in rows
-    ]

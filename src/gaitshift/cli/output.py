@@ -31,6 +31,7 @@ def emit_json(data: Any) -> None:
 def emit_table(title: str, rows: Sequence[tuple[str, ...]]) -> None:
     """A short table on stdout."""
     table = Table(title=title, show_header=False, title_justify="left")
+    table.add_column(no_wrap=True)  # names; what does not fit is broken in the other columns
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))  # units stand in brackets, as markup does
     Console().print(table)

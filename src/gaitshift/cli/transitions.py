@@ -14,7 +14,7 @@ from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 
-TABLE = "transitions.csv"
+TABLE, PAGE = "transitions.csv", "index.html"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,8 +22,9 @@ class Transitions:
     """Swap gaits in an instant: every ordered pair, at every phase of the stride.
 
     A shift succeeds when the robot does not fall within 5 s and shows the new gait. Writes
-    transitions.csv, README.md and a heat map a ground. Pairs that the table has already are kept,
-    so that a command that was broken off goes on.
+    transitions.csv, README.md, a heat map a ground, and all of it as one page to hover over,
+    index.html. Pairs that the table has already are kept, so that a command that was broken off
+    goes on.
     """
 
     gaits: Annotated[tuple[str, ...], tyro.conf.Positional] = ("trot", "pace", "bound")
@@ -79,6 +80,9 @@ class Transitions:
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         (self.out / README).write_text(page(rows, command))
+        from gaitshift.report import write_transition_page  # matplotlib is slow to import
+
+        write_transition_page(rows, self.out / PAGE, command=command)
         if self.json:
             emit_json({"out": str(self.out), "transitions": rows})
         else:

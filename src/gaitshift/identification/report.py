@@ -56,6 +56,27 @@ def write_report(
     return conditions
 
 
+def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
+    """Heading of a report, and how its numbers were chosen and judged."""
+    tuned = judged[0].tuned
+    who = (
+        "Other logs judged them than chose them."
+        if held_out
+        else "The same logs chose and judged them, so the figures flatter."
+    )
+    how = (
+        "Each condition was replayed at the numbers that were given."
+        if tuned.choice.is_free is None
+        else "Each condition was replayed over α, β and leaks; chosen was the soonest that never "
+        f"shifts where it should not, even at a β smaller by a quarter. {who}"
+    )
+    return _TITLES[tuned.way], (
+        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. Area: "
+        f"under the ROC curve of passages of {LENGTH:g} m, of the hardest course. Intervals are of "
+        "95 %."
+    )
+
+
 def _condition_row(one: Judged) -> Row:
     tuned, choice = one.tuned, one.tuned.choice
     tallies = [course.tally for course in one.courses]
@@ -122,25 +143,9 @@ def _readme(
     held_out: bool,
     pictures: Mapping[str, str],
 ) -> str:
-    tuned = judged[0].tuned
-    who = (
-        "Other logs judged them than chose them."
-        if held_out
-        else "The same logs chose and judged them, so the figures flatter."
-    )
-    how = (
-        "Each condition was replayed at the numbers that were given."
-        if tuned.choice.is_free is None
-        else "Each condition was replayed over α, β and leaks; chosen was the soonest that never "
-        f"shifts where it should not, even at a β smaller by a quarter. {who}"
-    )
-    words = (
-        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. Area: "
-        f"under the ROC curve of passages of {LENGTH:g} m, of the hardest course. Intervals are of "
-        "95 %."
-    )
-    parts = [f"# {_TITLES[tuned.way]}", words, f"Made by `{command}`.", "## Side by side"]
-    parts.append(_conditions_table(conditions))
+    title, words = introduction(judged, held_out)
+    parts = [f"# {title}", words, f"Made by `{command}`.", "## Side by side"]
+    parts.append(_table(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
     parts += [
         f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "
         "chose: the one with the fewest false shifts was taken."
@@ -151,47 +156,54 @@ def _readme(
     for one in judged:
         name = one.tuned.candidate.name
         parts += [f"## {name}", one.tuned.candidate.note.capitalize() + "."]
-        parts.append(_courses_table([row for row in courses if row["condition"] == name]))
+        of = [row for row in courses if row["condition"] == name]
+        parts.append(_table(COURSES_HEAD, [course_cells(row) for row in of]))
     return "\n\n".join(parts) + "\n"
 
 
-def _conditions_table(rows: Sequence[Row]) -> str:
-    head = ("condition", "α", "β", "leak", "noticed", "mean delay [m]", "false shifts", "area")
-    body = [
-        (
-            row["condition"],
-            f"{row['alpha']:.3g} {row['unit']}".strip(),
-            f"{row['beta']:g}",
-            f"{row['leak']:g}",
-            f"{row['detected']} of {row['came']}",
-            _number(row["delay_m"], 2),
-            f"{row['false_shifts']} in {row['km']:.2f} km",
-            _number(row["area"], 4),
-        )
-        for row in rows
-    ]
-    return _table(head, body)
+CONDITIONS_HEAD = (
+    *("condition", "α", "β", "leak"),
+    *("noticed", "mean delay [m]", "false shifts", "area"),
+)
+"""Above the cells of `condition_cells`."""
 
 
-def _courses_table(rows: Sequence[Row]) -> str:
-    head = ("course", "noticed", "delay [m]", "95 % within [m]", "delay [s]")
-    head += ("false shifts", "per km", "area")
-    body = [
-        (
-            row["course"],
-            f"{row['detected']} of {row['came']}" if row["came"] else "",
-            _number(row["delay_m"], 2),
-            _number(row["delay_m_p95"], 2),
-            _number(row["delay_s"], 2),
-            f"{row['false_shifts']} in {row['km']:.2f} km" if row["km"] else "",
-            f"{row['false_per_km_low']:.2g} to {row['false_per_km_high']:.2g}" if row["km"] else "",
-            ""
-            if row["area"] is None
-            else f"{row['area']:.4f} ({row['area_low']:.3f} to {row['area_high']:.3f})",
-        )
-        for row in rows
-    ]
-    return _table(head, body)
+def condition_cells(row: Row) -> tuple[str, ...]:
+    """One of `condition_rows` as text."""
+    return (
+        row["condition"],
+        f"{row['alpha']:.3g} {row['unit']}".strip(),
+        f"{row['beta']:g}",
+        f"{row['leak']:g}",
+        f"{row['detected']} of {row['came']}",
+        _number(row["delay_m"], 2),
+        f"{row['false_shifts']} in {row['km']:.2f} km",
+        _number(row["area"], 4),
+    )
+
+
+COURSES_HEAD = (
+    *("course", "noticed", "delay [m]", "95 % within [m]", "delay [s]"),
+    *("false shifts", "per km", "area"),
+)
+"""Above the cells of `course_cells`."""
+
+
+def course_cells(row: Row) -> tuple[str, ...]:
+    """One of `course_rows` as text."""
+    low, high = row["false_per_km_low"], row["false_per_km_high"]
+    return (
+        row["course"],
+        f"{row['detected']} of {row['came']}" if row["came"] else "",
+        _number(row["delay_m"], 2),
+        _number(row["delay_m_p95"], 2),
+        _number(row["delay_s"], 2),
+        f"{row['false_shifts']} in {row['km']:.2f} km" if row["km"] else "",
+        f"{low:.2g} to {high:.2g}" if row["km"] else "",
+        ""
+        if row["area"] is None
+        else f"{row['area']:.4f} ({row['area_low']:.3f} to {row['area_high']:.3f})",
+    )
 
 
 def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

@@ -18,13 +18,13 @@ from gaitshift.identification.finding import Judged, Tuned
 from gaitshift.plots.palette import GROUND, INK, PALE, PAPER, QUIET
 from gaitshift.plots.style import check_target, house_style, save
 
-_LINES = (
+LINES = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"),
     *("#7b4ea3", "#8c6d46", "#44aa99", "#882255", "#1f2933"),
 )
 """After Okabe and Ito, and Tol; conditions are not gaits, and no figure shows both."""
 
-_LATEST = 6.0
+LATEST = 6.0
 """Delays are shaded up to here [m]."""
 
 
@@ -43,7 +43,7 @@ def condition_map(tuned: Tuned, path: Path) -> Figure:
         shades = LinearSegmentedColormap.from_list("delay", ["#0b3c5d", "#4f97c4", "#dcebf5"])
         betas = grid.betas[1:]  # a logarithmic scale has no 0
         mesh = axes.pcolormesh(
-            betas, grid.alphas, delay[:, 1:], cmap=shades, vmin=0.0, vmax=_LATEST, shading="nearest"
+            betas, grid.alphas, delay[:, 1:], cmap=shades, vmin=0.0, vmax=LATEST, shading="nearest"
         )
         alarmed = np.where(~quiet, 1.0, np.nan)[:, 1:]
         false = LinearSegmentedColormap.from_list("false", ["#f3d9c4", "#f3d9c4"])
@@ -87,7 +87,7 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
         for index, one in enumerate(kept):
             area = one.area(course)
             x, y = roc(one.scores_on(course), one.other_scores)
-            colour = _LINES[index % len(_LINES)] if index < len(_LINES) else GROUND
+            colour = LINES[index % len(LINES)] if index < len(LINES) else GROUND
             axes.plot(x, y, color=colour, drawstyle="steps-post")
             rows.append((area[0] if area else 0.0, one.tuned.candidate.name, colour))
         for line, (area, name, colour) in enumerate(sorted(rows, reverse=True)):

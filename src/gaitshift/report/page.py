@@ -16,9 +16,10 @@ def write_page(
     *,
     title: str,
     summary: str,
-    walks: Sequence[tuple[str, Mapping[str, Any]]],
     sections: Sequence[tuple[str, str]],
+    walks: Sequence[tuple[str, Mapping[str, Any]]] = (),
     course: Mapping[str, Any] | None = None,
+    figures: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Writes a page, whole or not at all.
 
@@ -26,16 +27,18 @@ def write_page(
         path: the HTML file.
         title: its heading.
         summary: a line below it.
-        walks: names and data (`run_data`) of what the player shows; several are chosen from.
         sections: headings and HTML, from the top down; empty ones are left out.
+        walks: names and data (`run_data`) of what the player shows, which stands first; several are
+            chosen from. Without any there is no player.
         course: charts over something else than time, which stand before the sections.
+        figures: data (`report.figures`) of the figures in the sections, where `figure` put them;
+            for pages without a player.
     """
-    names = [html.escape(name) for name, _ in walks]
-    options = "".join(f"<option value='{i}'>{name}</option>" for i, name in enumerate(names))
-    choice = f"<p><label>policy <select id='walk'>{options}</select></label></p>"
     shown = [(head, content) for head, content in sections if content]
     body = "".join(f"<h2>{html.escape(head)}</h2>{content}" for head, content in shown)
-    data = "".join(_json(f"run{i}", walk, " data-walk") for i, (_, walk) in enumerate(walks))
+    data = "".join(_json(name, value) for name, value in (figures or {}).items())
+    if walks:
+        data += "".join(_json(f"run{i}", walk, " data-walk") for i, (_, walk) in enumerate(walks))
     if course is not None:
         told = "<p>Dotted lines are ends of stages; the wheel zooms, a double click shows all.</p>"
         body = f"<h2>Course of the training</h2><div id='course'></div>{told}{body}"
@@ -44,10 +47,10 @@ def write_page(
         "TITLE": html.escape(f"{title} · gaitshift"),
         "HEAD": html.escape(title),
         "SUMMARY": html.escape(summary),
-        "CHOICE": choice if len(walks) > 1 else "",
-        "SECTIONS": body,
+        "SECTIONS": (_stage([name for name, _ in walks]) if walks else "") + body,
+        "CREDIT": " Its player contains three.js (MIT)." if walks else "",
         "DATA": data,
-        "PLAYER": _read("player.js").replace("</script", "<\\/script"),
+        "SCRIPT": _read("player.js" if walks else "figures.js").replace("</script", "<\\/script"),
     }
     text = _read("page.html")
     for name, content in parts.items():
@@ -55,6 +58,20 @@ def write_page(
     part = path.with_suffix(".part")
     part.write_text(text, encoding="utf-8")
     part.replace(path)
+
+
+def figure(name: str) -> str:
+    """The place of a figure in a section."""
+    return f"<div data-figure='{name}'></div>"
+
+
+def _stage(names: Sequence[str]) -> str:
+    """The player, and above it what there is to choose from."""
+    options = "".join(
+        f"<option value='{i}'>{html.escape(name)}</option>" for i, name in enumerate(names)
+    )
+    choice = f"<p><label>policy <select id='walk'>{options}</select></label></p>"
+    return _read("stage.html").replace("@CHOICE@", choice if len(names) > 1 else "")
 
 
 def _json(name: str, value: Mapping[str, Any], mark: str = "") -> str:
