@@ -1,7 +1,9 @@
 """Ships a trained policy: the network, its curve and its figures go into the package.
 
-Usage: python tools/ship_policy.py [--trials all|short|quick] RUN...     (`make policies` trains and
-ships all)
+Usage: python tools/ship_policy.py [--trials all|short|quick] RUN|GAIT...
+
+A gait by its name is one that is shipped already: its figures are made anew. `make policies` trains
+and ships all.
 """
 
 import argparse
@@ -10,6 +12,7 @@ import json
 import shutil
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from gait_results import PAGE, page
 
@@ -28,21 +31,9 @@ def ship(run: Path, trials: str) -> None:
     """Copies the policy of `run`, thins its curve, and puts it through the standard trials."""
     loaded = policy.load(run / "policy.onnx")
     name = loaded.gait
-    rows, figures, log = run_trials(loaded, SIZES[trials])
-    print(name, json.dumps([row.to_dict() for row in rows]))
-    DIAGRAMS.mkdir(parents=True, exist_ok=True)
-    hildebrand_diagram(log, figures, loaded.machine, DIAGRAMS / f"{name}.png")
+    evaluation = judged(loaded, trials)
     shutil.copyfile(run / "policy.onnx", POLICIES / f"{name}.onnx")
-    record = {
-        **loaded.info.training,
-        "evaluation": {
-            "command": f"gaitshift evaluate {name} --trials {trials}",
-            "trials": [row.to_dict() for row in rows],
-            "commands": [asdict(row) for row in follow_commands(loaded)],
-            "flat": figures,
-        },
-    }
-    (POLICIES / f"{name}.json").write_text(json.dumps(_rounded(record), indent=1) + "\n")
+    write_record(name, {**loaded.info.training, "evaluation": evaluation})
     with (run / "progress.csv").open(newline="") as file:
         rows = [row for row in csv.DictReader(file) if int(row["iteration"]) % EVERY == 0]
     with (POLICIES / f"{name}.csv").open("w", newline="") as file:
@@ -51,6 +42,31 @@ def ship(run: Path, trials: str) -> None:
         lines.writerows(rows)
     CURVES.mkdir(parents=True, exist_ok=True)
     training_curves(run / "progress.csv", CURVES / f"{name}.png")
+
+
+def judge_again(name: str, trials: str) -> None:
+    """Puts a shipped policy through the standard trials."""
+    loaded = policy.load(name)
+    write_record(name, {**loaded.info.training, "evaluation": judged(loaded, trials)})
+
+
+def judged(loaded: policy.Policy, trials: str) -> dict[str, Any]:
+    """What comes of the standard trials and of commands; draws the diagram of its contacts."""
+    rows, figures, log = run_trials(loaded, SIZES[trials])
+    print(loaded.gait, json.dumps([row.to_dict() for row in rows]))
+    DIAGRAMS.mkdir(parents=True, exist_ok=True)
+    hildebrand_diagram(log, figures, loaded.machine, DIAGRAMS / f"{loaded.gait}.png")
+    return {
+        "command": f"gaitshift evaluate {loaded.gait} --trials {trials}",
+        "trials": [row.to_dict() for row in rows],
+        "commands": [asdict(row) for row in follow_commands(loaded)],
+        "flat": figures,
+    }
+
+
+def write_record(name: str, record: dict[str, Any]) -> None:
+    """Writes down where a shipped policy comes from and what it does."""
+    (POLICIES / f"{name}.json").write_text(json.dumps(_rounded(record), indent=1) + "\n")
 
 
 def _rounded(value: object) -> object:
@@ -64,8 +80,11 @@ def _rounded(value: object) -> object:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--trials", choices=tuple(SIZES), default="all")
-    parser.add_argument("runs", nargs="+", type=Path)
+    parser.add_argument("runs", nargs="+", metavar="RUN|GAIT")
     options = parser.parse_args()
-    for folder in options.runs:
-        ship(folder, options.trials)
+    for run in options.runs:
+        if run in policy.shipped():
+            judge_again(run, options.trials)
+        else:
+            ship(Path(run), options.trials)
     PAGE.write_text(page())
