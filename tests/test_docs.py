@@ -21,6 +21,7 @@ BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re
 def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monkeypatch, capsys):
     """Files are written, code is executed, commands are run; a training ends after 2 iterations."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")  # pages are read in the repository
     names, ran = {}, 0
     for kind, title, text in BLOCK.findall(page.read_text(encoding="utf-8")):
         if title:

@@ -19,6 +19,7 @@ from gaitshift.evaluation import (
 )
 from gaitshift.evaluation.trials import Row
 from gaitshift.log import Log
+from gaitshift.robot_file import robot_of
 
 UNITS = {
     "speed_mean": "m/s",
@@ -45,6 +46,8 @@ class Evaluate(EvaluationConfig):
 
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
+    robot_file: Path | None = None
+    """The robot of the policy, if it is not ANYmal B, as it was given to `train`."""
     trials: Literal["all", "short", "quick"] | None = None
     """Run the standard trials instead, each figure against its limit: all (1000 pushed episodes,
     then 256 of 20 s on each ground), short (a quarter of each), or quick ones for a first look."""
@@ -63,6 +66,7 @@ class Evaluate(EvaluationConfig):
     def run(self) -> None:
         """Evaluates, prints and draws."""
         self._check_files()
+        robot_of(self.robot_file)
         loaded = policies.load(self.policy)
         if self.commands:
             self._command(loaded)

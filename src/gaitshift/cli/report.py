@@ -12,6 +12,7 @@ from gaitshift.cli.output import progress, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import EvaluationConfig, evaluate
 from gaitshift.log import Log
+from gaitshift.robot_file import robot_of
 
 _TRACK, _SECONDS = "flat@5,perlin:0.1@12", 9.0
 """What policies of a training are shown on."""
@@ -35,6 +36,8 @@ class Report:
     """The HTML file; beside the log with its name, or report.html in the run, by default."""
     robot: int = 0
     """Which robot of the log, counted from 0."""
+    robot_file: Path | None = None
+    """What robot it is, if it is not ANYmal B, as it was given to `train`."""
     video: Path | None = None
     """An mp4 to show beside it."""
     overwrite: bool = False
@@ -42,6 +45,7 @@ class Report:
 
     def run(self) -> None:
         """Writes the page."""
+        robot_of(self.robot_file)
         is_run = self.source.is_dir()
         default = self.source / "report.html" if is_run else self.source.with_suffix(".html")
         log = None if is_run else Log.load(self.source)

@@ -15,6 +15,7 @@ from gaitshift import gaits
 from gaitshift.cli.output import emit_json, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import glance
+from gaitshift.robot_file import robot_of
 
 if TYPE_CHECKING:
     from gaitshift.training.run import Row, Run
@@ -33,6 +34,8 @@ class Train:
     """A gait by its name (see `gaitshift gaits`), or a machine file ending in .toml."""
     preset: Literal["default", "paper"] = "default"
     """Recipe: ours, or the paper's (Table I alone, 30 robots, Kp 3, Kd 0.2, flat ground)."""
+    robot_file: Path | None = None
+    """Another robot than ANYmal B, as a .toml file beside its MJCF."""
     robots: int | None = None
     """Robots in parallel; the recipe's by default."""
     iterations: int | None = None
@@ -77,7 +80,7 @@ class Train:
                 f"training needs the package '{error.name}'; install gaitshift[train]"
             ) from error
         if self.resume is not None:
-            if self.gait is not None:
+            if self.gait is not None or self.robot_file is not None:
                 raise GaitshiftError("give a gait, or --resume with the folder of a run, not both")
             return Run.resume(self.resume)
         if self.gait is None:
@@ -85,7 +88,7 @@ class Train:
             raise GaitshiftError(f"which gait? give one of {known}, a .toml file, or --resume DIR")
         if self.seed < 0:
             raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
-        machine = gaits.load(self.gait)
+        machine, robot = gaits.load(self.gait), robot_of(self.robot_file)
         recipe = PRESETS[self.preset]()
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)
@@ -94,9 +97,14 @@ class Train:
         if self.iterations is not None:
             recipe = recipe.with_iterations(self.iterations)
         folder = self.out or Path("runs") / f"{machine.name}-{self.seed}"
-        command = shlex.join(["gaitshift", *sys.argv[1:]])
         return Run.create(
-            folder, machine, recipe, seed=self.seed, command=command, overwrite=self.overwrite
+            folder,
+            machine,
+            recipe,
+            seed=self.seed,
+            command=shlex.join(["gaitshift", *sys.argv[1:]]),
+            robot=robot,
+            overwrite=self.overwrite,
         )
 
 

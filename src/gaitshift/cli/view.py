@@ -12,6 +12,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import DemoConfig
 from gaitshift.log import Log
 from gaitshift.robot import ANYMAL_B
+from gaitshift.robot_file import robot_of
 from gaitshift.switching import load_condition
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -26,6 +27,8 @@ class View:
 
     log: Annotated[Path | None, tyro.conf.Positional] = None
     """A log of `demo`, `evaluate`, `record` or of this page; without one robots walk live."""
+    robot_file: Path | None = None
+    """The robot of the log, if it is not ANYmal B, as it was given to `train`."""
     track: str = DemoConfig.track
     """The ground, piece by piece with lengths in metres."""
     robots: int = 1
@@ -58,6 +61,7 @@ class View:
             condition=load_condition(self.condition),
             seed=self.seed,
         )
+        robot_of(self.robot_file)
         if self.log is None:
             shipped = {name: policies.load(name) for name in _in_order(policies.shipped())}
             shown = LiveRun(config, shipped)

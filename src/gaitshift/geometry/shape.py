@@ -58,12 +58,12 @@ class Shape:
 
 
 def _mesh_of(model: mujoco.MjModel, body: int) -> trimesh.Trimesh | None:
-    """All that is to be looked at of a body, as one mesh."""
+    """All that is to be looked at of a body, as one mesh: groups up to `VISUAL`, as in MuJoCo."""
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     parts = [
         _geom(model, geom)
         for geom in range(first, first + count)
-        if model.geom_group[geom] == VISUAL
+        if model.geom_group[geom] <= VISUAL
     ]
     return cast(Any, trimesh.util).concatenate(parts) if parts else None
 

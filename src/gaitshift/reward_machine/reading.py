@@ -91,6 +91,13 @@ class Table:
         low, high = self._numbers(key, ends, wanted)
         return low, high
 
+    def numbers(self, key: str, count: int, wanted: str) -> tuple[float, ...]:
+        """Return a list of so many numbers; `wanted` says what they are."""
+        values = self._list(key, wanted)
+        if len(values) != count:
+            raise _wrong(key, wanted, values)
+        return tuple(self._numbers(key, values, wanted))
+
     def feet(self, key: str) -> Feet:
         """Return a list of feet, each named once."""
         names = self._list(key, 'a list of feet, such as ["FL", "BR"]')

@@ -19,6 +19,8 @@ from torch.utils.tensorboard import SummaryWriter
 from gaitshift.env import GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward_machine import RewardMachine
+from gaitshift.robot import ANYMAL_B, Robot
+from gaitshift.robot_file import from_dict, to_dict, use_robot
 from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
 from gaitshift.training.ground import FIELD, draw_grounds, stage_at
@@ -44,7 +46,13 @@ class Run:
     """
 
     def __init__(
-        self, folder: Path, machine: RewardMachine, recipe: Recipe, seed: int, command: str
+        self,
+        folder: Path,
+        machine: RewardMachine,
+        recipe: Recipe,
+        seed: int,
+        command: str,
+        robot: Robot = ANYMAL_B,
     ) -> None:
         self.folder = folder
         self.machine = machine
@@ -60,6 +68,7 @@ class Run:
             flat(FIELD, FIELD),
             recipe.robots,
             config=recipe.env,
+            robot=robot,
             threads=recipe.physics_threads,
         )
         self.learner = Learner(env, recipe)
@@ -73,6 +82,7 @@ class Run:
         *,
         seed: int,
         command: str,
+        robot: Robot = ANYMAL_B,
         overwrite: bool = False,
     ) -> "Run":
         """A new run in a new folder."""
@@ -83,7 +93,7 @@ class Run:
                     f"or --resume {folder}"
                 )
             _clear(folder)
-        run = cls(folder, machine, recipe, seed, command)
+        run = cls(folder, machine, recipe, seed, command, robot)
         folder.mkdir(parents=True, exist_ok=True)
         config = {
             "command": command,
@@ -92,6 +102,8 @@ class Run:
             "recipe": asdict(recipe),
             "versions": _versions(),
         }
+        if robot != ANYMAL_B:
+            config["robot"] = to_dict(robot)
         # First of all, so that a folder left half made by a kill still shows what it is.
         (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
         (folder / CHECKPOINTS).mkdir(exist_ok=True)
@@ -105,7 +117,9 @@ class Run:
             config = json.loads((folder / CONFIG).read_text())
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
-            run = cls(folder, machine, recipe, config["seed"], config["command"])
+            robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
+            use_robot(robot)
+            run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
         except FileNotFoundError as error:
             raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
         except (ValueError, KeyError, TypeError) as error:
