@@ -70,7 +70,7 @@ def shifted(tmp_path_factory):
 
 def test_a_map_says_of_the_chosen_cell_what_judging_said_of_the_chosen_numbers(identified):
     """The same logs chose and judged: two ways to the same figures."""
-    data = figures(identified / "index.html")
+    data = figures(identified / "page.html")
     rows = rows_of(identified / "conditions.csv")
     assert [row["condition"] for row in rows] == ["height_difference", "paper"]
     for index, row in enumerate(rows):
@@ -89,7 +89,7 @@ def test_a_map_says_of_the_chosen_cell_what_judging_said_of_the_chosen_numbers(i
 
 
 def test_cells_without_a_shade_are_those_with_false_shifts_and_with_misses(identified):
-    figure = figures(identified / "index.html")["map0"]
+    figure = figures(identified / "page.html")["map0"]
     kind = np.reshape(unpacked(figure["kind"]), (figure["y"]["count"], figure["x"]["count"]))
     wrong, noticed = told(figure, "false shifts"), told(figure, "noticed")
     assert set(np.unique(kind)) == {0, 1, 2}
@@ -102,7 +102,7 @@ def test_cells_without_a_shade_are_those_with_false_shifts_and_with_misses(ident
 
 def test_the_area_under_a_drawn_roc_curve_is_the_area_that_is_told(identified):
     """By trapezes, where the report counts pairs (Mann and Whitney)."""
-    figure = figures(identified / "index.html")["roc0"]
+    figure = figures(identified / "page.html")["roc0"]
     course = figure["title"].removeprefix("ROC curves on ")
     areas = {
         row["condition"]: float(row["area"])
@@ -120,11 +120,11 @@ def test_numbers_that_were_given_have_no_map(identified, tmp_path):
     log = str(identified.parent / "walk0.csv")
     given = ["--condition", "paper", "--alpha", "0.2", "--beta", "1000"]
     main(["identify", log, *given, "--out", str(tmp_path / "given")])
-    assert set(figures(tmp_path / "given" / "index.html")) == {"roc0"}
+    assert set(figures(tmp_path / "given" / "page.html")) == {"roc0"}
 
 
 def test_the_map_of_shifts_is_the_table_of_shifts(shifted):
-    data = figures(shifted / "index.html")
+    data = figures(shifted / "page.html")
     rows = rows_of(shifted / "transitions.csv")
     grounds = list(dict.fromkeys(row["ground"] for row in rows))
     assert len(data) == len(grounds)
@@ -156,7 +156,7 @@ def test_ticks_are_round_numbers_at_the_cells_nearest_to_them():
 @pytest.mark.slow
 @browsing.needed
 def test_the_pointer_reads_the_figures_without_a_network(identified, shifted, browser):
-    opened, wrong = browsing.opened(browser, (shifted / "index.html").as_uri(), offline=True)
+    opened, wrong = browsing.opened(browser, (shifted / "page.html").as_uri(), offline=True)
     canvas, note = (opened.locator(f"[data-figure] {part}").nth(1) for part in ("canvas", ".note"))
     canvas.scroll_into_view_if_needed()
     box = canvas.bounding_box()
@@ -172,7 +172,7 @@ def test_the_pointer_reads_the_figures_without_a_network(identified, shifted, br
     assert browsing.keep(opened, "transitions").std() > 20
     assert not wrong
 
-    opened, wrong = browsing.opened(browser, (identified / "index.html").as_uri(), offline=True)
+    opened, wrong = browsing.opened(browser, (identified / "page.html").as_uri(), offline=True)
     choice = rows_of(identified / "conditions.csv")[0]
     holder = opened.locator("details[open] [data-figure]").nth(1)
     note, canvas = holder.locator(".note"), holder.locator("canvas")

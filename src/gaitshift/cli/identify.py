@@ -15,7 +15,7 @@ from gaitshift.errors import GaitshiftError
 if TYPE_CHECKING:
     from gaitshift.identification.finding import Judged, Recordings
 
-ROC, PAGE = "roc.png", "index.html"
+ROC, PAGE = "roc.png", "page.html"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +26,7 @@ class Identify:
     robot with the columns time, rough, contact_FL, foot_FL_x and so on. Every condition is replayed
     over a grid of α, β and leaks; the soonest detection that never shifts on smooth ground is
     chosen. Writes README.md, conditions.csv, courses.csv, a map a condition, ROC curves, and all of
-    it as one page to hover over and zoom into, index.html.
+    it as one page to hover over and zoom into, page.html.
     """
 
     logs: Annotated[tuple[Path, ...], tyro.conf.Positional]

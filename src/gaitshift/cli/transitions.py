@@ -14,7 +14,7 @@ from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 
-TABLE, PAGE = "transitions.csv", "index.html"
+TABLE, PAGE = "transitions.csv", "page.html"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class Transitions:
 
     A shift succeeds when the robot does not fall within 5 s and shows the new gait. Writes
     transitions.csv, README.md, a heat map a ground, and all of it as one page to hover over,
-    index.html. Pairs that the table has already are kept, so that a command that was broken off
+    page.html. Pairs that the table has already are kept, so that a command that was broken off
     goes on.
     """
 

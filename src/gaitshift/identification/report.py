@@ -144,7 +144,12 @@ def _readme(
     pictures: Mapping[str, str],
 ) -> str:
     title, words = introduction(judged, held_out)
-    parts = [f"# {title}", words, f"Made by `{command}`.", "## Side by side"]
+    parts = [
+        f"# {title}",
+        words,
+        f"Made by `{command}`. [As a page](page.html) to hover over and zoom into.",
+        "## Side by side",
+    ]
     parts.append(_table(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
     parts += [
         f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "

@@ -27,7 +27,7 @@ _HEAD = (
 
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
-    parts = [_INTRODUCTION, f"Made by `{command}`."]
+    parts = [_INTRODUCTION, f"Made by `{command}`. [As a page](page.html) to hover over."]
     for ground in dict.fromkeys(row["ground"] for row in rows):
         of = [row for row in rows if row["ground"] == ground]
         total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
