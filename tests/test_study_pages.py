@@ -63,7 +63,8 @@ def shifted(tmp_path_factory):
     """Folder of a study of shifts: the committed one, whose rows are kept."""
     out = tmp_path_factory.mktemp("shifts") / "transitions"
     shutil.copytree(SHIFTS, out)
-    main(["transitions", "--out", str(out)])
+    switches = rows_of(out / "transitions.csv")[0]["switches"]
+    main(["transitions", "--switches", switches, "--out", str(out)])
     assert (out / "transitions.csv").read_bytes() == (SHIFTS / "transitions.csv").read_bytes()
     return out
 
