@@ -109,7 +109,7 @@ class Identify:
             held_out=bool(self.held_out),
             pictures=_draw(judged, self.out),
         )
-        from gaitshift.report import write_identification_page  # matplotlib is slow to import
+        from gaitshift.report.study_pages import write_identification_page
 
         title, words = reports.introduction(judged, bool(self.held_out))
         page = self.out / PAGE

@@ -80,7 +80,7 @@ class Transitions:
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         (self.out / README).write_text(page(rows, command))
-        from gaitshift.report import write_transition_page  # matplotlib is slow to import
+        from gaitshift.report.study_pages import write_transition_page
 
         write_transition_page(rows, self.out / PAGE, command=command)
         if self.json:

@@ -2,6 +2,4 @@
 
 from gaitshift.report.log_page import MOST_VIDEO as MOST_VIDEO
 from gaitshift.report.log_page import write_report as write_report
-from gaitshift.report.study_pages import write_identification_page as write_identification_page
-from gaitshift.report.study_pages import write_transition_page as write_transition_page
 from gaitshift.report.training_page import write_training_report as write_training_report
