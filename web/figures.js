@@ -234,10 +234,10 @@ function axes(pen, box, data, across, up) {
   pen.restore();
 }
 
-const KINDS = { map, curves };
+const FIGURES = { map, curves };
 const drawn = [...document.querySelectorAll("[data-figure]")].map((holder) => {
   const data = unpack(JSON.parse(document.getElementById(holder.dataset.figure).textContent));
-  return KINDS[data.kindOf](holder, data);
+  return FIGURES[data.figure](holder, data);
 });
 const redraw = () => drawn.forEach((draw) => draw());
 themed(redraw);

@@ -17,6 +17,9 @@ from gaitshift.robot import ANYMAL_B, ROBOTS, Gains, Robot
 _NUMBERS = ("foot_radius", "effort_limit", "velocity_limit", "action_scale")
 _KEYS = ("name", "model", "stance", *_NUMBERS, "gains")
 
+_LEVEL = 0.05
+"""Feet of a stance may differ by this in height [m]; ours."""
+
 SENSORS = (
     *(f"{leg}_position" for leg in LEGS),
     *(f"{leg}_velocity" for leg in LEGS),
@@ -57,7 +60,7 @@ def read_robot(path: Path) -> Robot:
             return _with_height(robot, _checked_model(robot))
 
 
-def robot_of(path: Path | None) -> Robot:
+def use_robot_file(path: Path | None) -> Robot:
     """The robot in a file, known from here on; without a file ANYmal B."""
     if path is None:
         return ANYMAL_B
@@ -166,12 +169,10 @@ def _with_height(robot: Robot, model: mujoco.MjModel) -> Robot:
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0, *robot.stance]
     mujoco.mj_kinematics(model, data)
-    low = min(float(data.site(f"{leg}_foot").xpos[2]) for leg in LEGS)
-    high = max(float(data.site(f"{leg}_foot").xpos[2]) for leg in LEGS)
-    if high - low > 0.05:
+    feet = [float(data.site(f"{leg}_foot").xpos[2]) for leg in LEGS]
+    if (apart := max(feet) - min(feet)) > _LEVEL:
         raise GaitshiftError(
-            f"in the stance the feet are {100 * (high - low):.0f} cm apart in height; level feet "
+            f"in the stance the feet are {100 * apart:.0f} cm apart in height; level feet "
             f"would be right (angles in the order of {', '.join(LEGS)} × {', '.join(JOINTS)})"
         )
-    height = robot.foot_radius - low
-    return replace(robot, stance_height=height)
+    return replace(robot, stance_height=robot.foot_radius - min(feet))

@@ -19,7 +19,7 @@ from gaitshift.evaluation import (
 )
 from gaitshift.evaluation.trials import Row
 from gaitshift.log import Log
-from gaitshift.robot_file import robot_of
+from gaitshift.robot_file import use_robot_file
 
 UNITS = {
     "speed_mean": "m/s",
@@ -66,7 +66,7 @@ class Evaluate(EvaluationConfig):
     def run(self) -> None:
         """Evaluates, prints and draws."""
         self._check_files()
-        robot_of(self.robot_file)
+        use_robot_file(self.robot_file)
         loaded = policies.load(self.policy)
         if self.commands:
             self._command(loaded)

@@ -12,7 +12,7 @@ from gaitshift.cli.output import progress, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import EvaluationConfig, evaluate
 from gaitshift.log import Log
-from gaitshift.robot_file import robot_of
+from gaitshift.robot_file import use_robot_file
 
 _TRACK, _SECONDS = "flat@5,perlin:0.1@12", 9.0
 """What policies of a training are shown on."""
@@ -45,7 +45,7 @@ class Report:
 
     def run(self) -> None:
         """Writes the page."""
-        robot_of(self.robot_file)
+        use_robot_file(self.robot_file)
         is_run = self.source.is_dir()
         default = self.source / "report.html" if is_run else self.source.with_suffix(".html")
         log = None if is_run else Log.load(self.source)

@@ -65,16 +65,16 @@ class Reproduce:
         with progress(f"{len(wanted)} runs") as report:
             train_all(wanted, runs, self.jobs, report)
         with progress("judging") as report:
-            told = write_report(Results.read(plan, runs, told), runs, out, told, report)
-        _say_broken(told)
+            written = write_report(Results.read(plan, runs, told), runs, out, told, report)
+        _say_broken(written)
         if self.json:
-            emit_json(told)
+            emit_json(written)
             return
-        emit_table("does it hold?", [(f["name"], f["verdict"]) for f in told["findings"]])
-        print(f"look into {out}: {', '.join(told['files'])}")
+        emit_table("does it hold?", [(f["name"], f["verdict"]) for f in written["findings"]])
+        print(f"look into {out}: {', '.join(written['files'])}")
 
 
-def _say_broken(told: dict[str, Any]) -> None:
-    for row in told["ablations"]:
+def _say_broken(written: dict[str, Any]) -> None:
+    for row in written["ablations"]:
         if row["broke_down"]:
             say(f"{row['broke_down']} of {row['seeds']} runs of '{row['setting']}' broke down")

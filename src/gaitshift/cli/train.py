@@ -15,7 +15,7 @@ from gaitshift import gaits
 from gaitshift.cli.output import emit_json, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import glance
-from gaitshift.robot_file import robot_of
+from gaitshift.robot_file import use_robot_file
 
 if TYPE_CHECKING:
     from gaitshift.training.run import Row, Run
@@ -88,7 +88,7 @@ class Train:
             raise GaitshiftError(f"which gait? give one of {known}, a .toml file, or --resume DIR")
         if self.seed < 0:
             raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
-        machine, robot = gaits.load(self.gait), robot_of(self.robot_file)
+        machine, robot = gaits.load(self.gait), use_robot_file(self.robot_file)
         recipe = PRESETS[self.preset]()
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)

@@ -12,7 +12,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import DemoConfig
 from gaitshift.log import Log
 from gaitshift.robot import ANYMAL_B
-from gaitshift.robot_file import robot_of
+from gaitshift.robot_file import use_robot_file
 from gaitshift.switching import load_condition
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -61,7 +61,7 @@ class View:
             condition=load_condition(self.condition),
             seed=self.seed,
         )
-        robot_of(self.robot_file)
+        use_robot_file(self.robot_file)
         if self.log is None:
             shipped = {name: policies.load(name) for name in _in_order(policies.shipped())}
             shown = LiveRun(config, shipped)

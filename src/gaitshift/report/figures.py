@@ -124,7 +124,7 @@ def heat_map(
         words: written into the cells, row by row, which are square then.
     """
     return {
-        "kindOf": "map",
+        "figure": "map",
         "title": title,
         "x": x.to_dict(),
         "y": y.to_dict(),
@@ -160,7 +160,7 @@ class Curve:
 def curves(*, title: str, x: str, y: str, series: Sequence[Curve]) -> dict[str, Any]:
     """Curves side by side, with the names of the axes."""
     return {
-        "kindOf": "curves",
+        "figure": "curves",
         "title": title,
         "x": {"name": x},
         "y": {"name": y},

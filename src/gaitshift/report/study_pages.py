@@ -21,6 +21,8 @@ from gaitshift.plots.palette import gait_colours
 from gaitshift.report.data import title_of
 from gaitshift.report.figures import Axis, Curve, Kind, Said, curves, heat_map
 from gaitshift.report.page import facts_table, figure, table, write_page
+from gaitshift.studies.table import Row
+from gaitshift.studies.transition_page import HEAD, row_cells
 
 _FALSE = Kind(name="shifts where it should not", colour="#f3d9c4")
 _MISSED = Kind(name="no shift at all, or most missed", colour="pale")
@@ -64,7 +66,7 @@ def write_identification_page(
     write_page(path, title=title, summary=words, sections=sections, figures=figures)
 
 
-def write_transition_page(rows: Sequence[Mapping[str, Any]], path: Path, *, command: str) -> None:
+def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> None:
     """Writes the page of shifts: a map and a table a ground.
 
     Args:
@@ -79,8 +81,8 @@ def write_transition_page(rows: Sequence[Mapping[str, Any]], path: Path, *, comm
         total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
         figures[f"ground{index}"] = _transition_map(of)
         said = f"<p>{good} of {total} shifts succeeded.</p>"
-        cells = [(_transition_cells(row), None) for row in of]
-        content = said + figure(f"ground{index}") + table(_TRANSITIONS_HEAD, cells)
+        cells = [(row_cells(row), None) for row in of]
+        content = said + figure(f"ground{index}") + table(HEAD, cells)
         sections.append((f"On {ground}", content))
     sections.append(("What made it", facts_table({"command": command})))
     write_page(
@@ -151,28 +153,7 @@ def _roc(judged: Sequence[Judged], course: str) -> dict[str, Any]:
     )
 
 
-_TRANSITIONS_HEAD = (
-    *("from", "to", "succeeded", "interval, 95 %", "fell", "settled, 95 % within"),
-    *("dip of speed", "tilt, 95 % within", "worst phase"),
-)
-
-
-def _transition_cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    settled = row["settle_s_p95"]
-    return (
-        title_of(row["old"]),
-        title_of(row["new"]),
-        f"{row['successes']} of {row['switches']}",
-        f"{row['low']:.4f} to {row['high']:.4f}",
-        str(row["fell"]),
-        "–" if settled == "" else f"{settled:.2f} s",
-        f"{row['dip_m_s']:.2f} m/s",
-        f"{row['tilt_deg_p95']:.0f}°",
-        f"{row['worst_phase']}: {row['worst_phase_success']:.3f}",
-    )
-
-
-def _transition_map(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _transition_map(rows: Sequence[Row]) -> dict[str, Any]:
     """Failures by pair: new gaits across, old ones down."""
     gaits = list(dict.fromkeys(name for row in rows for name in (row["old"], row["new"])))
     colours = gait_colours(gaits)
@@ -180,21 +161,21 @@ def _transition_map(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     count = len(gaits)
     failed = np.zeros((count, count))
     kind = np.full((count, count), 2)
-    told: dict[str, list[str]] = {name: [""] * count**2 for name in _TRANSITIONS_HEAD[2:]}
+    told: dict[str, list[str]] = {name: [""] * count**2 for name in HEAD[2:]}
     words = [""] * count**2
     for row in rows:
         j, i = count - 1 - gaits.index(row["old"]), gaits.index(row["new"])
         failures = row["switches"] - row["successes"]
-        failed[j, i] = 100.0 * failures / row["switches"]
+        failed[j, i] = failures / row["switches"]
         kind[j, i] = 0 if failures else 1
         words[j * count + i] = str(failures)
-        for name, cell in zip(told, _transition_cells(row)[2:], strict=True):
+        for name, cell in zip(told, row_cells(row)[2:], strict=True):
             told[name][j * count + i] = cell
     return heat_map(
         title=f"Failed shifts on {rows[0]['ground']}",
         x=Axis.of_names("to", dict(titles)),
         y=Axis.of_names("from", dict(reversed(titles.items()))),
-        shade=np.sqrt(failed / 100.0),
+        shade=np.sqrt(failed),
         scale="failed, 0 to 100 % (by its square root)",
         span=(0.0, 1.0),
         stops=("#f7e3d6", "#d55e00", "#7a2f00"),

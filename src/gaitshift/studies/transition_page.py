@@ -12,7 +12,7 @@ gait for half of its steps or more; settle time: until the first such stride is 
 the mean speed of a stride falls below the slower of the two commands. Intervals are Wilson's, of
 95 %."""
 
-_HEAD = (
+HEAD = (
     "from",
     "to",
     "succeeded",
@@ -23,6 +23,7 @@ _HEAD = (
     "tilt, 95 % within [°]",
     "worst phase",
 )
+"""Above the cells of `row_cells`."""
 
 
 def page(rows: Sequence[Row], command: str) -> str:
@@ -31,7 +32,7 @@ def page(rows: Sequence[Row], command: str) -> str:
     for ground in dict.fromkeys(row["ground"] for row in rows):
         of = [row for row in rows if row["ground"] == ground]
         total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
-        lines = [_HEAD, ("---",) * len(_HEAD), *(_cells(row) for row in of)]
+        lines = [HEAD, ("---",) * len(HEAD), *(row_cells(row) for row in of)]
         parts += [
             f"## {ground}",
             f"{good} of {total} shifts succeeded.",
@@ -46,7 +47,8 @@ def picture_of(ground: str) -> str:
     return f"{ground.replace(':', '-')}.png"
 
 
-def _cells(row: Row) -> tuple[str, ...]:
+def row_cells(row: Row) -> tuple[str, ...]:
+    """A row of the table of shifts as text."""
     return (
         row["old"],
         row["new"],
