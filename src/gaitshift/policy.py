@@ -183,7 +183,10 @@ def _check(policy: Policy) -> None:
     """Refuses a policy whose robot is unknown or whose parts contradict each other."""
     info = policy.info
     if info.robot not in ROBOTS:
-        raise GaitshiftError(f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}")
+        raise GaitshiftError(
+            f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}; any other one needs "
+            "its file (--robot-file)"
+        )
     if info.control_rate != 1.0 / CONTROL_PERIOD:
         raise GaitshiftError(
             f"it acts {info.control_rate:g} times a second; {1.0 / CONTROL_PERIOD:g} would be right"
