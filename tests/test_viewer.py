@@ -1,5 +1,6 @@
 """Pages in the browser: the robots behind them, what is drawn, and the pages themselves."""
 
+import json
 import re
 import signal
 import socket
@@ -37,6 +38,27 @@ def walk(run, seconds):
     while frames[-1].time < seconds - 1e-9 and not run.is_over:
         frames.append(run.step())
     return frames
+
+
+# Whether a page keeps real time -----------------------------------------------------------------
+
+
+def test_a_page_walks_no_faster_than_time_and_draws_every_second_step(capsys):
+    main(["bench", "page", "--page-seconds", "2", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["robots_1", "robots_16"]
+    for figures in found.values():
+        assert 0.1 < figures["real_time"] <= 1.02
+        assert figures["pictures_per_s"] == pytest.approx(50 * figures["real_time"])
+        assert 0.0 < figures["core_share"] <= 1.05
+    one, many = found.values()
+    assert 0.05 < one["sent_mb_per_s"] < many["sent_mb_per_s"]
+
+
+def test_a_page_for_no_time_is_refused(capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(["bench", "page", "--page-seconds", "0"])
+    assert "1 to 3600" in capsys.readouterr().err
 
 
 # Robots that walk now -----------------------------------------------------------------------------

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from gaitshift import policy
 from gaitshift.benchmark.outcome import Outcome, ratio_text, summary, write_csv
 from gaitshift.benchmark.speed import SpeedConfig, environment_speed, training_speed
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
+from gaitshift.errors import GaitshiftError
 
 if TYPE_CHECKING:
     from gaitshift.benchmark.time_to_gait import TimeToGait
@@ -47,15 +49,18 @@ class Bench:
     `speed`: steps a second of the environment, beside bare physics in the same run, and of
     training. `time-to-gait`: training until trot, pace and bound first pass a check on flat ground
     (survival ≥ 0.99, speed within 0.1 m/s, pattern fraction ≥ 0.6), beside stable-baselines3's PPO
-    at its defaults with 30 robots; hours, most of them the baseline's.
+    at its defaults with 30 robots; hours, most of them the baseline's. `page`: whether the page of
+    `gaitshift view` keeps real time on one core, drawing 50 times a second.
     """
 
-    what: Annotated[Literal["speed", "time-to-gait"], tyro.conf.Positional] = "speed"
+    what: Annotated[Literal["speed", "time-to-gait", "page"], tyro.conf.Positional] = "speed"
     """What to measure."""
     speed: SpeedConfig = field(default_factory=SpeedConfig)
     """For `bench speed`."""
     time_to_gait: TimeToGaitOptions = field(default_factory=TimeToGaitOptions)
     """For `bench time-to-gait`."""
+    page_seconds: float = 20.0
+    """For `bench page`: time that each page runs [s]."""
     json: bool = False
     """One JSON object on stdout."""
 
@@ -63,6 +68,8 @@ class Bench:
         """Measures and prints."""
         if self.what == "speed":
             self._measure_speed()
+        elif self.what == "page":
+            self._measure_page()
         else:
             self._measure_time_to_gait()
 
@@ -81,6 +88,29 @@ class Bench:
             for name, value in figures.items()
         ]
         emit_table(f"bench: {self.speed.robots} robots on {self.speed.terrain}", rows)
+
+    def _measure_page(self) -> None:
+        try:
+            from gaitshift.viewer.timing import ROBOTS, page_speed
+        except ImportError as error:
+            raise GaitshiftError(
+                f"the page needs the package '{error.name}'; install gaitshift[view]"
+            ) from error
+        policies = {name: policy.load(name) for name in policy.shipped()}
+        found: dict[int, dict[str, float]] = {}
+        with progress("watching") as report:
+            for robots in ROBOTS:
+                found[robots] = page_speed(robots, self.page_seconds, policies)
+                report(len(found), len(ROBOTS))
+        if self.json:
+            emit_json({f"robots_{robots}": figures for robots, figures in found.items()})
+            return
+        rows = [
+            (f"{name}, robots: {robots}", f"{value:.2f}")
+            for robots, figures in found.items()
+            for name, value in figures.items()
+        ]
+        emit_table("bench: the live page on one core", rows)
 
     def _measure_time_to_gait(self) -> None:
         from gaitshift.benchmark.time_to_gait import time_to_gait

@@ -47,19 +47,23 @@ class LivePage:
         self._paused, self._single = False, False
         self._factor = 1.0
         self._owed = 0.0
+        self.pictures = 0
+        """Drawn so far."""
+        self.walked = 0.0
+        """Time that robots have walked so far, over all restarts [s]."""
         self._build()
         self._show_ground()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Walks and draws until told to end, or for ever."""
-        clock, picture = Clock(), 0
+        clock = Clock()
         while not until():
             self._obey()
             frame = self._advance()
             if frame is not None:
                 self._scene.draw(frame)
-                picture += 1
-                if picture % _CHARTS_EVERY == 0 or self._paused:
+                self.pictures += 1
+                if self.pictures % _CHARTS_EVERY == 0 or self._paused:
                     self._charts.draw(self._tape)
                     self._tell(frame)
             clock.wait()
@@ -74,6 +78,7 @@ class LivePage:
         while self._owed >= 1.0:
             self._owed -= 1.0
             frame = self._live.step()
+            self.walked += CONTROL_PERIOD
             self._tape.add(frame)
         if self._live.is_over:
             self._restart(replace(self._live.config, seed=self._live.config.seed + 1))
