@@ -41,6 +41,7 @@ TINY = Recipe(
             swing_factor=1.5,
             kl_factor=3.0,
             horizon_factor=2.0,
+            mixed_starts=0.5,
         ),
     ),
     robots=4,
@@ -346,6 +347,7 @@ def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
         np.testing.assert_array_equal(ground.height, expected.height)
     assert run.learner.env.config.push.force == 100.0
     assert run.learner.env.swing_factor == 1.5
+    assert run.learner.env.mixed_starts == 0.5
     assert run.learner.env.strictness == run.learner.env.command_scale == 1.0
     settled = run.recipe.settling(run.recipe.iterations - 1)
     assert settled < 1.0

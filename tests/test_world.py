@@ -513,6 +513,48 @@ def test_placed_robots_rest_upright_with_the_lowest_foot_on_the_ground():
     np.testing.assert_allclose(motion.gravity_b, np.tile([0, 0, -1], (4, 1)), atol=1e-15)
 
 
+def test_robots_placed_on_their_way_go_on_alike_whichever_way_they_head():
+    """Mechanics know no heading: turned by ψ, all that follows is turned by ψ."""
+    rng, turn = np.random.default_rng(3), np.array([0.0, 0.9, -2.2])
+    same = {
+        "joint_position": STANCE + rng.normal(0.0, 0.1, 12),
+        "joint_velocity": rng.normal(0.0, 2.0, 12),
+        "base_angular_velocity_b": rng.normal(0.0, 0.5, 3),
+    }
+    tilt = np.array([np.cos(0.15), 0.6 * np.sin(0.15), 0.8 * np.sin(0.15), 0.0])
+    velocity = np.array([1.1, -0.2, 0.3])
+    forward, left = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+    across = (velocity[0] * forward + velocity[1] * left).T
+    world = robots(3, xy=np.zeros((3, 2)), yaw=turn)
+    world.place(
+        np.arange(3),
+        xy=np.zeros((3, 2)),
+        yaw=turn,
+        attitude=np.tile(tilt, (3, 1)),
+        base_velocity_w=np.column_stack([across, np.full(3, velocity[2])]),
+        **{name: np.tile(given, (3, 1)) for name, given in same.items()},
+    )
+    motion = world.motion
+    np.testing.assert_allclose(motion.joint_velocity, np.tile(same["joint_velocity"], (3, 1)))
+    np.testing.assert_allclose(motion.clearance.min(axis=1), 0.0, atol=1e-12)
+    # A turn by 0.3 rad about (0.6, 0.8, 0) takes the body's vertical along with it.
+    upright = motion.rotation_wb[0, :, 2]
+    np.testing.assert_allclose(
+        upright, [0.8 * np.sin(0.3), -0.6 * np.sin(0.3), np.cos(0.3)], atol=1e-12
+    )
+    for target in np.repeat(wild_targets(1, 8), 3, axis=1):
+        motion = world.step(target)
+    ahead, aside = (
+        np.einsum("in,ni->n", axis, motion.base_position_w[:, :2]) for axis in (forward, left)
+    )
+    np.testing.assert_allclose(ahead, ahead[0], atol=1e-4)
+    np.testing.assert_allclose(aside, aside[0], atol=1e-4)
+    assert ahead[0] > 0.03
+    for name in ("joint_position", "base_linear_velocity_b", "gravity_b", "foot_position_b"):
+        array = getattr(motion, name)
+        np.testing.assert_allclose(array, np.broadcast_to(array[0], array.shape), atol=1e-3)
+
+
 def test_a_robot_that_lies_on_an_edge_has_memory_for_all_of_its_contacts():
     edge = step(0.1, length=4.0, width=4.0).moved(-2.0, 0.0)
     model = build_model(ANYMAL_B, ANYMAL_B.gains_of("default"), edge)

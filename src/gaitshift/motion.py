@@ -108,3 +108,12 @@ def rotation_of(quaternion: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, 
         for j, entry in enumerate(row):
             rotation[..., i, j] = entry
     return rotation
+
+
+def turned(
+    quaternion: Float[np.ndarray, "*batch 4"], yaw: Float[np.ndarray, "*batch"]
+) -> Float[np.ndarray, "*batch 4"]:
+    """Unit quaternions (w, x, y, z) turned by `yaw` about world z [rad]."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    c, s = np.cos(yaw / 2), np.sin(yaw / 2)
+    return np.stack((c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w), axis=-1)

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from gaitshift.command import ACTION_LIMIT, CONTROL_PERIOD, Command
 from gaitshift.env.config import EnvConfig
+from gaitshift.env.mixed_start import MixedStart, mix
 from gaitshift.env.swings import Swings
 from gaitshift.motion import Motion
 from gaitshift.observation import Observation, Situation, last_touch
@@ -60,6 +61,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
         self.penalty_scale = 1.0
         """The factor λ on all penalties now, 0 to 1 (paper III-D, where it is always 1)."""
+        self.mixed_starts = 0.0
+        """The share of episodes that begin in the midst of a stride that is no gait's (`mix`), of
+        those that begin while others go on."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
             -np.inf, np.inf, (self.observe.size,), np.float32
@@ -176,6 +180,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
         rng, config, count = self._rng, self.config, len(ids)
+        moving, start = self._draw_mixed(ids)
         yaw = rng.choice((0.0, np.pi), count)  # edges lie across x: up and down, head on
         velocity = np.zeros((count, 3))
         velocity[:, :2] = rng.uniform(-config.velocity_noise, config.velocity_noise, (count, 2))
@@ -195,8 +200,47 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._age[ids] = 0
         self._last_action[ids] = 0.0
         self._line[ids] = self._heading[ids] = yaw
+        if start is not None:
+            self._set_going(moving, start)
         self._draw_commands(ids)
         self._update_command()
+
+    def _draw_mixed(
+        self, ids: Int[np.ndarray, " K"]
+    ) -> tuple[Int[np.ndarray, " M"], MixedStart | None]:
+        """Which of the robots that start anew do so on their way, and how."""
+        moving = ids[:0]
+        if self.mixed_starts > 0 and len(ids) < self.num_envs:
+            moving = ids[self._rng.random(len(ids)) < self.mixed_starts]
+        if moving.size == 0:
+            return moving, None
+        others = np.setdiff1d(np.arange(self.num_envs), ids)
+        return moving, mix(
+            self.world.motion,
+            self._last_action,
+            self._touch_height,
+            among=others,
+            count=len(moving),
+            rng=self._rng,
+        )
+
+    def _set_going(self, ids: Int[np.ndarray, " M"], start: MixedStart) -> None:
+        """Robots that stand at their starting points go on as if they had been on their way."""
+        turn = self._line[ids] - start.yaw
+        c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
+        self.world.place(
+            ids,
+            xy=self.world.motion.base_position_w[ids, :2],
+            yaw=turn,
+            attitude=start.attitude,
+            joint_position=start.joint_position,
+            joint_velocity=start.joint_velocity,
+            base_velocity_w=np.stack((c * x - s * y, s * x + c * y, z), axis=-1),
+            base_angular_velocity_b=start.base_angular_velocity_b,
+        )
+        self._state[ids] = self.machine.enter(start.contact)
+        self._last_action[ids] = start.last_action
+        self._touch_height[ids] = start.touch_height
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:

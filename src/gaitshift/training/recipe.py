@@ -66,6 +66,9 @@ class Stage:
     """Iterations between two draws of the ground (paper III-D)."""
     push: float = 0.0
     """Largest push on the base [N]."""
+    mixed_starts: float = 0.0
+    """Share of the episodes that begin in the midst of a stride that is no gait's, as after a shift
+    from another gait (`GaitEnv.mixed_starts`); ours, the paper trains nothing for shifts."""
     swing_factor: float = 1.0
     """Factor on the swing heights that the gait asks for; ours: feet that swing 14 cm high, where
     10 cm is enough on level ground, do not catch on steps."""

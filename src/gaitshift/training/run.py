@@ -205,7 +205,7 @@ class Run:
         if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
             env.set_terrain(draw_grounds(stage, within, self.seed))
             env.push_at_most(stage.push)
-        env.swing_factor = stage.swing_factor
+        env.swing_factor, env.mixed_starts = stage.swing_factor, stage.mixed_starts
         env.strictness = self.recipe.strictness(self.iteration)
         env.command_scale = self.recipe.command_scale(self.iteration)
         env.penalty_scale = self.recipe.penalty_scale(self.iteration)

@@ -9,7 +9,7 @@ from mujoco.batch import Batch
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
-from gaitshift.motion import Motion
+from gaitshift.motion import Motion, turned
 from gaitshift.robot import Robot
 from gaitshift.terrain import Terrain
 from gaitshift.world.scene import build_model
@@ -88,24 +88,40 @@ class World:
         *,
         xy: Float[np.ndarray, "K 2"],
         yaw: Float[np.ndarray, " K"],
+        attitude: Float[np.ndarray, "K 4"] | None = None,
         joint_position: Float[np.ndarray, "K 12"] | None = None,
+        joint_velocity: Float[np.ndarray, "K 12"] | None = None,
         base_velocity_w: Float[np.ndarray, "K 3"] | None = None,
+        base_angular_velocity_b: Float[np.ndarray, "K 3"] | None = None,
     ) -> None:
-        """Sets robots down with the base upright and the lowest foot on the ground.
+        """Sets robots down with the lowest foot on the ground, at rest in their stance.
 
-        `ids` are in rising order. Base at `xy` [m] and `yaw` [rad], at rest unless a velocity [m/s]
-        is given; joints in the stance unless given [rad].
+        Args:
+            ids: which, in rising order.
+            xy: of the base [m].
+            yaw: that the base is turned by [rad].
+            attitude: before that turn (w, x, y, z); upright if not given.
+            joint_position: [rad]; the stance if not given.
+            joint_velocity: [rad/s]; 0 if not given, as are the velocities of the base.
+            base_velocity_w: [m/s].
+            base_angular_velocity_b: [rad/s].
         """
         qpos = np.zeros((len(ids), _POSE + 12))
         qpos[:, :2] = xy
         qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
-        qpos[:, 3], qpos[:, 6] = np.cos(yaw / 2), np.sin(yaw / 2)
+        upright = np.tile((1.0, 0.0, 0.0, 0.0), (len(ids), 1))
+        qpos[:, 3:_POSE] = turned(upright if attitude is None else attitude, yaw)
         qpos[:, _POSE:] = self._stance if joint_position is None else joint_position
         self._batch.reset(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self._qpos[ids] = qpos
         self._qvel[ids] = 0.0
-        if base_velocity_w is not None:
-            self._qvel[ids, :3] = base_velocity_w
+        for part, given in (
+            (slice(0, 3), base_velocity_w),
+            (slice(3, _TWIST), base_angular_velocity_b),
+            (slice(_TWIST, None), joint_velocity),
+        ):
+            if given is not None:
+                self._qvel[ids, part] = given
         self._batch.forward(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_POS))
         feet = self._feet(self._sensors[ids])
         below = (feet[..., 2] - self._ground(feet[..., :2], ids)).min(axis=1)
