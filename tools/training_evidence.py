@@ -1,10 +1,12 @@
-"""Trains many times on flat ground and writes what came of it: docs/results/seeds.md, additions.md.
+"""Trains many times and writes what came of it: pages below docs/results.
 
-Usage: python tools/training_evidence.py seeds|additions [--jobs N]
+Usage: python tools/training_evidence.py seeds|additions|shifts [--jobs N]
 
-`seeds` trains trot, pace and bound with five fresh seeds each; `additions` trains trot without each
-of the reward's additions in turn, three seeds each. One run takes about five minutes on a core.
-Broken off, the same command goes on where it stopped (runs/evidence).
+`seeds` trains trot, pace and bound on flat ground with five fresh seeds each; `additions` trains
+trot without each of the reward's additions in turn, three seeds each; one run takes about five
+minutes on a core. `shifts` trains bound to the end, three seeds with and three without episodes
+that begin in the midst of a stride, a quarter of an hour each. Broken off, the same command goes on
+where it stopped (runs/evidence).
 """
 
 import argparse
@@ -15,15 +17,19 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any
 
+import numpy as np
+
 from gaitshift import gaits, policy
 from gaitshift.cli.output import progress
 from gaitshift.evaluation import EvaluationConfig, evaluate
 from gaitshift.gait_analysis import FIRST_GAITS
+from gaitshift.identification.statistics import wilson
 from gaitshift.reproduction.plan import Job
 from gaitshift.reproduction.pool import train_all
 from gaitshift.reproduction.settings import Setting
 from gaitshift.reward import ADDITIONS, BONUS_SHARES
 from gaitshift.reward_machine import RewardMachine
+from gaitshift.studies.transitions import Pair, run_pair
 from gaitshift.training.recipe import Recipe
 from gaitshift.training.run import POLICY
 
@@ -51,6 +57,23 @@ of a change that the bonus depends on (`gaitshift.reward.ADDITIONS`, `BONUS_SHAR
 three seeds, each policy judged on flat ground, 64 robots for 12 s. Clean: how many of the three
 keep all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
 This page is made by `python tools/training_evidence.py additions`.
+"""
+SHIFTED = "bound"
+"""The gait that shifts into fail most often."""
+SHIFT_SEEDS = range(3)
+MIXED_STARTS = 0.5
+SWITCHES = 1024
+ROUGH = EvaluationConfig(episodes=128, seconds=20.0)
+SHIFTS_HEAD = """# Trained for shifts
+
+The paper swaps gaits in an instant and trains nothing for it. Here bound goes through the default
+recipe, and through one that differs in one number: on the rough stage the share {share:g} of the
+episodes begins in the midst of a stride that is no gait's, each leg where another robot has it
+(`Stage.mixed_starts`). Then {switches} robots shift into it at all phases of a trot, and as many of
+a pace, on noise of 0.10 m, as in `gaitshift transitions`; touchdowns (of the foot furthest from
+one a cycle) and cost of transport on flat ground, 64 robots for 12 s; survival of 20 s on rough
+ground, 128 robots.
+This page is made by `python tools/training_evidence.py shifts`.
 """
 
 
@@ -158,6 +181,67 @@ def write_additions(processes: int) -> Path:
     return _write("additions.md", ADDITIONS_HEAD, "", head, rows)
 
 
+def write_shifts(processes: int) -> Path:
+    """The table of shifts into policies that were trained for them, and into others."""
+    plain = Recipe(threads=1, physics_threads=1)
+    flat, rough = plain.stages
+    mixed = replace(plain, stages=(flat, replace(rough, mixed_starts=MIXED_STARTS)))
+    settings = (
+        Default(name="plain", group="shifts", label="as it is", recipe=plain),
+        Default(name="mixed", group="shifts", label="mixed starts", recipe=mixed),
+    )
+    jobs = jobs_of(settings, (SHIFTED,), SHIFT_SEEDS)
+    figures = judged(jobs, processes)
+    old = [gait for gait in FIRST_GAITS if gait != SHIFTED]
+    grounds = ("perlin:0.15", "stairs:0.05", "step:0.10")
+    head = ("training", "seed", *(f"{gait} → {SHIFTED}" for gait in old), "fell", "interval")
+    head += ("touchdowns", "CoT", *grounds)
+    rows: list[tuple[str, ...]] = []
+    for setting in settings:
+        sums = np.zeros(len(old) + 1, dtype=int)
+        for job in (job for job in jobs if job.setting == setting):
+            trained = policy.load(RUNS / job.name / POLICY)
+            outcomes = [
+                run_pair(
+                    {gait: policy.load(gait), SHIFTED: trained},
+                    Pair(gait, SHIFTED),
+                    ground="perlin:0.10",
+                    switches=SWITCHES,
+                    seed=0,
+                )
+                for gait in old
+            ]
+            counts = [int(o.success.sum()) for o in outcomes]
+            counts.append(sum(int(o.fell.sum()) for o in outcomes))
+            sums += counts
+            on_flat = figures[job.name]
+            rough = [evaluate(trained, replace(ROUGH, terrain=g))[0]["survival"] for g in grounds]
+            rows.append(
+                (
+                    setting.label,
+                    str(job.seed),
+                    *_shift_cells(counts, SWITCHES),
+                    f"{max(on_flat['touchdowns_per_cycle'], key=lambda x: abs(x - 1)):.2f}",
+                    f"{on_flat['cost_of_transport']:.2f}",
+                    *(f"{share:.3f}" for share in rough),
+                )
+            )
+        cells = _shift_cells(sums.tolist(), SWITCHES * len(SHIFT_SEEDS))
+        rows.append((setting.label, "all", *cells, *[""] * (2 + len(grounds))))
+    return _write("shifting/trained-on-shifts.md", SHIFTS_HEAD, "", head, rows)
+
+
+def _shift_cells(counts: list[int], switches: int) -> tuple[str, ...]:
+    """Successes of each pair, falls, and the interval of the share of successes."""
+    *came_off, fell = counts
+    low, high = wilson(np.array(float(sum(came_off))), np.array(float(switches * len(came_off))))
+    return (
+        *(f"{count} of {switches}" for count in came_off),
+        str(fell),
+        f"{float(low):.4f} to {float(high):.4f}",
+    )
+
+
 def _mean(figures: list[dict[str, Any]], name: str, of: Callable[[Any], float]) -> str:
     return f"{fmean(of(one[name]) for one in figures):.2f}"
 
@@ -170,15 +254,19 @@ def _write(
     lines = [columns, ("---",) * len(columns), *rows]
     table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     path = RESULTS / name
-    text = head.format(iterations=recipe.iterations, steps=steps)
+    text = head.format(
+        iterations=recipe.iterations, steps=steps, share=MIXED_STARTS, switches=SWITCHES
+    )
     path.write_text(f"{text}\n{words}\n{table}\n" if words else f"{text}\n{table}\n")
     return path
 
 
+WRITERS = {"seeds": write_seeds, "additions": write_additions, "shifts": write_shifts}
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("seeds", "additions"))
+    parser.add_argument("what", choices=tuple(WRITERS))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     options = parser.parse_args()
-    write = write_seeds if options.what == "seeds" else write_additions
-    print(f"written: {write(options.jobs)}")
+    print(f"written: {WRITERS[options.what](options.jobs)}")
