@@ -336,10 +336,20 @@ def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
     assert "closed" in process.stderr.read()
 
 
+def number_box(page, label):
+    """What is beside the slider of this label."""
+    row = page.locator("div").filter(has=page.locator("label", has_text=label)).last
+    return row.locator("xpath=..").locator("input.mantine-NumberInput-input")
+
+
+def shown_time(page):
+    """Where a log stands [s]."""
+    return float(number_box(page, "time [s]").input_value())
+
+
 def enter(page, label, number):
     """Types a number beside the slider of this label."""
-    row = page.locator("div").filter(has=page.locator("label", has_text=label)).last
-    box = row.locator("xpath=..").locator("input.mantine-NumberInput-input")
+    box = number_box(page, label)
     box.fill(str(number))
     box.press("Enter")
 
@@ -367,4 +377,50 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
     assert browsing.shows_a_robot(picture[:, : picture.shape[1] * 2 // 3]), "beside the panel"
     page.get_by_role("button", name="push", exact=True).click()
     time.sleep(1.0)
+    assert not wrong
+
+
+@pytest.mark.slow
+@browsing.needed
+def test_two_tabs_see_the_same_robot_and_a_machine_that_slept_does_not_hurry(served, browser):
+    process, address = served("--track", "flat@200")
+    one, wrong_in_one = opened(browser, address)
+    other, wrong_in_other = opened(browser, address)
+    one.get_by_role("button", name="pace", exact=True).click()
+    wait_until(gait_is(other, "pace"))
+    one.close()
+    walked = status(other)[1]
+    wait_until(lambda: status(other)[1] > walked + 0.5)
+    process.send_signal(signal.SIGSTOP)  # the lid is closed
+    time.sleep(5.0)
+    before, woken = status(other)[2], time.monotonic()
+    process.send_signal(signal.SIGCONT)
+    wait_until(lambda: status(other)[2] > before + 1.0)
+    assert status(other)[2] - before < time.monotonic() - woken + 1.0, "the five seconds are let go"
+    assert not wrong_in_one
+    assert not wrong_in_other
+
+
+@pytest.mark.slow
+@browsing.needed
+def test_a_log_plays_in_the_browser_and_its_slider_is_obeyed(served, browser, policies, tmp_path):
+    run = LiveRun(LiveConfig(track="flat@30", is_autonomous=False), policies)
+    run.record()
+    walk(run, 6.0)
+    run.end_recording().save(tmp_path / "log.npz")
+    _, address = served(str(tmp_path / "log.npz"))
+    page, wrong = opened(browser, address)
+    wait_until(lambda: 0.5 < shown_time(page) < 5.0)
+    page.get_by_role("button", name="pause", exact=True).click()
+    page.get_by_role("button", name="play", exact=True).wait_for()
+    time.sleep(1.0)  # what was on its way has come
+    enter(page, "time [s]", 4.5)
+    time.sleep(1.0)
+    assert shown_time(page) == pytest.approx(4.5, abs=0.02)
+    time.sleep(1.0)
+    assert shown_time(page) == pytest.approx(4.5, abs=0.02), "it stands still"
+    picture = browsing.keep(page, "replay")
+    assert browsing.shows_a_robot(picture[:, : picture.shape[1] * 2 // 3]), "beside the panel"
+    page.get_by_role("button", name="play", exact=True).click()
+    wait_until(lambda: abs(shown_time(page) - 4.5) > 0.3)
     assert not wrong
