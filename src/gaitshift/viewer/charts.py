@@ -46,15 +46,21 @@ class Charts:
         time = tape.of("time") - last.time
         if len(time) < 2:
             return
-        heights = tape.of("foot_height")
+        self._show_condition(bool((tape.of("threshold") + tape.of("k")).any()))
         self._counter.data = (time, *counter(tape))
-        self._heights.data = (time, *heights.T.astype(float))
+        self._heights.data = (time, *tape.of("foot_height").T.astype(float))
         self._speed.data = (time, tape.of("speed").astype(float))
         gait, state = int(last.gait[tape.robot]), int(last.machine_state[tape.robot])
         machine = self._machines[gait]
         self._machine.content = (
             "" if machine is None else machine_svg(machine, state, self._colours[gait])
         )
+
+    def _show_condition(self, shown: bool) -> None:
+        """Whether the two charts of the condition are there: not where there is none."""
+        for chart in (self._counter, self._heights):
+            if chart.visible != shown:
+                chart.visible = shown
 
     @staticmethod
     def _chart(gui: Any, title: str, names: tuple[str, ...], colours: tuple[str, ...]) -> Any:

@@ -79,7 +79,8 @@ class ReplayPage:
         panel.dock_left()
         panel.set_width(340)
         end = self._frames[-1].time
-        gui.add_markdown(f"{log.terrain} · {len(self._frames[0].qpos)} robots · {end:.1f} s")
+        n = len(self._frames[0].qpos)
+        gui.add_markdown(f"{log.terrain} · {n} robot{'s' if n > 1 else ''} · {end:.1f} s")
         play = gui.add_button("pause")
         self._slider = gui.add_slider(
             "time [s]", min=0.0, max=end, step=TICK, initial_value=self._frames[0].time
