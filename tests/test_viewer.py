@@ -382,6 +382,26 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
 
 @pytest.mark.slow
 @browsing.needed
+def test_a_click_records_a_log_and_a_page(served, browser, tmp_path):
+    _, address = served("--track", "flat@200", "--robots", "2")
+    page, wrong = opened(browser, address)
+    page.get_by_text("Recording", exact=True).click()
+    page.get_by_role("button", name="record", exact=True).click()
+    begun = status(page)[2]
+    wait_until(lambda: status(page)[2] > begun + 2.0)
+    page.get_by_role("button", name="end and save", exact=True).click()
+    page.get_by_text("opens from disk").first.wait_for()
+    log = Log.load(tmp_path / "recorded" / "log-1.npz")
+    assert log.k.shape[1] == 2
+    assert len(log.time) > 150
+    told = (tmp_path / "recorded" / "run-1.html").read_text()
+    assert "<html" in told
+    assert len(told) > 1e5
+    assert not wrong
+
+
+@pytest.mark.slow
+@browsing.needed
 def test_two_tabs_see_the_same_robot_and_a_machine_that_slept_does_not_hurry(served, browser):
     process, address = served("--track", "flat@200")
     one, wrong_in_one = opened(browser, address)
