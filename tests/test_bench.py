@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from gaitshift import gaits, policy
+from gaitshift.benchmark import replay
 from gaitshift.benchmark import time_to_gait as race
 from gaitshift.benchmark.baseline import ROBOTS, Baseline
 from gaitshift.benchmark.check import Check, Figures
@@ -368,3 +369,11 @@ def test_the_help_tells_both_measurements_apart(capsys):
         main(["bench", "--help"])
     told = capsys.readouterr().out
     assert all(word in told for word in ("{speed,time-to-gait}", "--baseline-budget", "--robots"))
+
+
+def test_the_replay_is_measured_with_and_without_a_leak(capsys, monkeypatch):
+    monkeypatch.setattr(replay, "EPISODES", 3)
+    main(["bench", "replay", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["no_leak_s", "leak_s"]
+    assert all(0.0 < seconds < 60.0 for seconds in found.values())

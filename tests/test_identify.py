@@ -84,6 +84,10 @@ def test_numbers_that_are_chosen_notice_noise_and_keep_still_on_smooth_ground():
         assert area is not None
         assert area[0] == 1.0
         assert judged.area("flat") is None, "nothing to notice there"
+        assert judged.soonest == one.rule.soonest(one.candidate.values(ways()[0]).shape[2])
+        way = sum(float(way.distance[-1].sum()) for way in ways())
+        time = sum(len(way.time) * way.period * way.robots for way in ways())
+        assert judged.speed == pytest.approx(way / time)
     assert 0.002 < tuned[0].choice.alpha < 0.08
 
 

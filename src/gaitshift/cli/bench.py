@@ -50,10 +50,13 @@ class Bench:
     training. `time-to-gait`: training until trot, pace and bound first pass a check on flat ground
     (survival ≥ 0.99, speed within 0.1 m/s, pattern fraction ≥ 0.6), beside stable-baselines3's PPO
     at its defaults with 30 robots; hours, most of them the baseline's. `page`: whether the page of
-    `gaitshift view` keeps real time on one core, drawing 50 times a second.
+    `gaitshift view` keeps real time on one core, drawing 50 times a second. `replay`: how long
+    `identify` takes for 1000 episodes of 20 s, 100 α and 1000 β.
     """
 
-    what: Annotated[Literal["speed", "time-to-gait", "page"], tyro.conf.Positional] = "speed"
+    what: Annotated[Literal["speed", "time-to-gait", "page", "replay"], tyro.conf.Positional] = (
+        "speed"
+    )
     """What to measure."""
     speed: SpeedConfig = field(default_factory=SpeedConfig)
     """For `bench speed`."""
@@ -70,6 +73,8 @@ class Bench:
             self._measure_speed()
         elif self.what == "page":
             self._measure_page()
+        elif self.what == "replay":
+            self._measure_replay()
         else:
             self._measure_time_to_gait()
 
@@ -111,6 +116,22 @@ class Bench:
             for name, value in figures.items()
         ]
         emit_table("bench: the live page on one core", rows)
+
+    def _measure_replay(self) -> None:
+        try:
+            from gaitshift.benchmark.replay import ALPHAS, BETAS, EPISODES, replay_speed
+        except ImportError as error:
+            raise GaitshiftError(
+                f"the replay needs the package '{error.name}'; install gaitshift[identify]"
+            ) from error
+        seconds = replay_speed(self.speed.seed)
+        if self.json:
+            emit_json(seconds)
+            return
+        what = f"{EPISODES} episodes, {len(ALPHAS)} α, {len(BETAS)} β"
+        emit_table(
+            "bench: replay", [(f"{what}, {name}", f"{x:.1f}") for name, x in seconds.items()]
+        )
 
     def _measure_time_to_gait(self) -> None:
         from gaitshift.benchmark.time_to_gait import time_to_gait

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification.candidates import BETAS, Candidate
 from gaitshift.identification.choice import Choice, choose
-from gaitshift.identification.grid import first_firings
+from gaitshift.identification.grid import first_firings, steps_alive
 from gaitshift.identification.passage import passage_scores
 from gaitshift.identification.recording import Recording
 from gaitshift.identification.scores import detections
@@ -68,6 +68,10 @@ class Judged:
     """The condition."""
     courses: tuple[OnCourse, ...]
     """Course by course."""
+    soonest: float
+    """What β is in time [s]: from k = 0 to firing where every value counts in each step."""
+    speed: float
+    """Mean speed of the robots that judged [m/s]."""
 
     def area(self, course: str) -> tuple[float, float, float] | None:
         """Area under the ROC curve of the passages to be noticed on a course, with its interval.
@@ -166,8 +170,13 @@ def judge(
 ) -> list[Judged]:
     """What conditions with their numbers do on recordings, course by course."""
     courses: dict[str, dict[str, OnCourse]] = {one.candidate.name: {} for one in tuned}
+    soonest: dict[str, float] = {}
+    way, time = 0.0, 0.0
     for recording in recordings():
         report(recording.name)
+        steps = steps_alive(recording.alive)
+        way += float(recording.distance[steps - 1, np.arange(recording.robots)].sum())
+        time += float(steps.sum()) * recording.period
         for one in tuned:
             seen = _facing(recording, one.way)
             if not one.candidate.is_fed_by(seen):
@@ -177,6 +186,7 @@ def judge(
             alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
             values = one.candidate.values(recording)
             first = first_firings(values, seen.alive, one.rule, alpha, beta)
+            soonest[one.candidate.name] = one.rule.soonest(values.shape[2], recording.period)
             kept = courses[one.candidate.name]
             course = kept.setdefault(
                 seen.name, OnCourse(course=seen.name, tally=Tally(shape=(1, 1)))
@@ -187,7 +197,15 @@ def judge(
             scores = passage_scores(seen, values, one.rule, one.grid.alphas)
             for is_wanted, of in scores.items():
                 course.scores[is_wanted] += of
-    return [Judged(tuned=one, courses=tuple(courses[one.candidate.name].values())) for one in tuned]
+    return [
+        Judged(
+            tuned=one,
+            courses=tuple(courses[one.candidate.name].values()),
+            soonest=soonest[one.candidate.name],
+            speed=way / time,
+        )
+        for one in tuned
+    ]
 
 
 def _rule(way: Way, alpha: float, beta: float, leak: float) -> Rule:

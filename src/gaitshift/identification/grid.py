@@ -6,6 +6,9 @@ from jaxtyping import Bool, Float, Int
 from gaitshift.errors import GaitshiftError
 from gaitshift.switching import Rule
 
+_TOGETHER = 16
+"""Robots that a leaking counter is run for at once: some more take memory, fewer take time."""
+
 
 def first_firings(
     values: Float[np.ndarray, "T N M"],
@@ -29,26 +32,30 @@ def first_firings(
     steps, robots, _ = values.shape
     first = np.empty((robots, len(alphas), len(betas)), dtype=np.int32)
     last = steps_alive(alive)
-    for robot in range(robots):
-        k = counters(values[:, robot], rule, alphas)
-        rising = np.maximum.accumulate(k, axis=1) if rule.leak else k
-        for a in range(len(alphas)):
-            first[robot, a] = np.searchsorted(rising[a], betas, "right")
-        first[robot][first[robot] >= last[robot]] = steps
+    for start in range(0, robots, _TOGETHER):
+        block = range(start, min(start + _TOGETHER, robots))
+        for robot, k in zip(block, counters(values[:, block], rule, alphas), strict=True):
+            rising = np.maximum.accumulate(k, axis=1) if rule.leak else k
+            for a in range(len(alphas)):
+                first[robot, a] = np.searchsorted(rising[a], betas, "right")
+            if last[robot] < steps:
+                first[robot][first[robot] >= last[robot]] = steps
     return first
 
 
 def counters(
-    values: Float[np.ndarray, "T M"], rule: Rule, alphas: Float[np.ndarray, " A"]
-) -> Float[np.ndarray, "A T"]:
-    """Counter k of one robot after each step, at each α, never set back."""
-    growth = rule.epsilon * counts_at(values, rule, alphas) - rule.leak
+    values: Float[np.ndarray, "T N M"], rule: Rule, alphas: Float[np.ndarray, " A"]
+) -> Float[np.ndarray, "N A T"]:
+    """Counter k of each robot after each step, at each α, never set back."""
+    counts = np.stack([counts_at(of_robot, rule, alphas) for of_robot in values.swapaxes(0, 1)])
+    growth = rule.epsilon * counts - rule.leak
     if not rule.leak:
-        return growth.cumsum(axis=1)
-    k, last = np.empty(growth.shape[::-1]), np.zeros(len(alphas))
-    for t, grown in enumerate(np.ascontiguousarray(growth.T)):
+        return growth.cumsum(axis=2)
+    steps = np.ascontiguousarray(np.moveaxis(growth, 2, 0))
+    k, last = np.empty(steps.shape), np.zeros(steps.shape[1:])
+    for t, grown in enumerate(steps):
         last = np.maximum(last + grown, 0.0, out=k[t])
-    return k.T
+    return np.ascontiguousarray(np.moveaxis(k, 0, 2))
 
 
 def counts_at(

@@ -30,7 +30,7 @@ def passage_scores(
     for robot in range(recording.robots):
         rough, way = recording.rough[:, robot], recording.distance[:, robot]
         for start, end in _cut(rough[: ends[robot]], way[: ends[robot]]):
-            k = counters(values[start:end, robot], rule, alphas)
+            k = counters(values[start:end, [robot]], rule, alphas)[0]
             scores[bool(rough[start])].append(int(np.count_nonzero(k.max(axis=1) > rule.beta)))
     return scores
 

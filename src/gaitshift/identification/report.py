@@ -71,9 +71,10 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
         f"shifts where it should not, even at a β smaller by a quarter. {who}"
     )
     return _TITLES[tuned.way], (
-        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. Area: "
-        f"under the ROC curve of passages of {LENGTH:g} m, of the hardest course. Intervals are of "
-        "95 %."
+        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. β in "
+        "time and way: until k exceeds it where all values lie beyond α, at the robots' mean "
+        f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course. "
+        "Intervals are of 95 %."
     )
 
 
@@ -87,11 +88,14 @@ def _condition_row(one: Judged) -> Row:
     km = sum(float(tally.km[0, 0]) for tally in tallies)
     delays = [delay for course in one.courses for delay in course.delays_m]
     areas = [area for course in one.courses if (area := one.area(course.course)) is not None]
+    soonest = one.soonest if np.isfinite(one.soonest) else None
     return {
         "condition": tuned.candidate.name,
         "alpha": choice.alpha,
         "unit": tuned.candidate.unit,
         "beta": choice.beta,
+        "beta_s": soonest,
+        "beta_m": None if soonest is None else soonest * one.speed,
         "leak": choice.leak,
         "keeps_still": choice.is_free,
         "came": came,
@@ -167,7 +171,7 @@ def _readme(
 
 
 CONDITIONS_HEAD = (
-    *("condition", "α", "β", "leak"),
+    *("condition", "α", "β", "β [s]", "β [m]", "leak"),
     *("noticed", "mean delay [m]", "false shifts", "area"),
 )
 """Above the cells of `condition_cells`."""
@@ -179,6 +183,8 @@ def condition_cells(row: Row) -> tuple[str, ...]:
         row["condition"],
         f"{row['alpha']:.3g} {row['unit']}".strip(),
         f"{row['beta']:g}",
+        _number(row["beta_s"], 2),
+        _number(row["beta_m"], 2),
         f"{row['leak']:g}",
         f"{row['detected']} of {row['came']}",
         _number(row["delay_m"], 2),

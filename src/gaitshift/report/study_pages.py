@@ -96,8 +96,8 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
 
 
 def _titled(cells: tuple[str, ...]) -> str:
-    name, alpha, beta, leak, noticed, delay, false, _ = cells
-    numbers = f"α {alpha}, β {beta}, leak {leak}"
+    name, alpha, beta, seconds, metres, leak, noticed, delay, false, _ = cells
+    numbers = f"α {alpha}, β {beta} ({seconds or '–'} s, {metres or '–'} m), leak {leak}"
     return f"{name}: {numbers}: noticed {noticed}, after {delay or '–'} m; {false} false"
 
 

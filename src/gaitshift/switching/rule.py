@@ -82,3 +82,7 @@ class Rule:
         """
         rise = self.epsilon * counts - self.leak
         return math.inf if rise <= 0.0 else period * (math.floor(self.beta / rise) + 1)
+
+    def soonest(self, width: int, period: float = CONTROL_PERIOD) -> float:
+        """What β is in time [s]: `delay` where all of a statistic's `width` values count."""
+        return self.delay(width if self.when == "above" else 1, period)

@@ -284,8 +284,14 @@ class LivePage:
     def _tell(self, frame: Frame) -> None:
         gait = self._live.gaits[int(frame.gait[0])].replace("_", "-")
         x = float(frame.qpos[0, 0])
-        count = f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f}" if frame.threshold[0] else "–"
         state = "fallen" if frame.fallen[0] else f"{frame.speed[0]:.2f} m/s"
+        count = "–"
+        if frame.threshold[0]:
+            soonest = self._live.config.soonest(self._live.gaits[int(frame.gait[0])])
+            way = soonest * max(float(frame.speed[0]), 0.0)
+            count = (
+                f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f} (β: {soonest:.2f} s, {way:.2f} m)"
+            )
         self._status.content = f"**{gait}** · {state} · {x:.1f} m · {frame.time:.1f} s · {count}"
 
 
