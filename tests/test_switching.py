@@ -307,6 +307,37 @@ def test_after_a_switch_the_machine_is_in_the_state_that_fits_the_contacts(polic
     assert gaits_of(driver) == [gait] * len(FITTING) + [other]
 
 
+def test_a_machine_that_a_shift_began_and_that_stands_still_begins_anew(policies):
+    """Trot's cycle takes 40 steps at 2.5 Hz: on four feet it waits for two of them, 80 steps."""
+    driver = Driver(policies, 3, start="bound")
+    standing = motion_of(["FL FR BL BR"] * 3)
+    command = replace(driver.own_command(), stride_frequency=np.full(3, 2.5))
+    driver.switch(np.array([0, 1]), "trot", motion_of(["FR BL"] * 3))
+    assert driver.machine_state.tolist() == [1, 1, 0]
+    for _ in range(80):
+        driver.see(standing, command)
+    assert driver.machine_state.tolist() == [1, 1, 0]
+    driver.see(standing, command)
+    assert driver.machine_state.tolist() == [0, 0, 0]
+    assert driver.steps_in_state.tolist() == [0, 0, 81]
+    for _ in range(200):
+        driver.see(standing, command)
+    assert driver.steps_in_state.tolist() == [200, 200, 281], "it waits for its feet from there on"
+
+
+def test_a_machine_that_has_moved_since_the_shift_may_stand_still(policies):
+    driver = Driver(policies, 1, start="bound")
+    command = replace(driver.own_command(), stride_frequency=np.full(1, 2.5))
+    driver.switch(np.array([0]), "trot", motion_of(["FL BR"]))
+    for feet in ["FL BR"] * 25 + ["FR BL"]:
+        driver.see(motion_of([feet]), command)
+    assert driver.machine_state.tolist() == [1]
+    for _ in range(200):
+        driver.see(motion_of(["FL FR BL BR"]), command)
+    assert driver.machine_state.tolist() == [1]
+    assert driver.steps_in_state.tolist() == [200]
+
+
 def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_action(policies):
     driver = Driver(policies, 2, start="trot")
     motion = motion_of(["FR BL", "BL BR"])

@@ -12,12 +12,18 @@ from gaitshift.observation import Situation, last_touch
 from gaitshift.policy import Policy
 from gaitshift.robot import Robot
 
+STUCK = 2.0
+"""Strides for which a machine that a shift began may stand still, until it begins anew as at the
+start of an episode; ours: a walk that is taken up from a fast gait may come to a stand on four feet
+in a state in which no episode of its training stood, and out of which it knows no way."""
+
 
 class Driver:
     """One policy and one machine a gait, and which of them each robot uses now.
 
     A change of gait replaces policy and machine at once (paper III-E); the new machine starts in
-    the state that fits the present contacts best (ours, the paper is silent).
+    the state that fits the present contacts best (ours, the paper is silent), and begins anew where
+    it has not moved for `STUCK` strides.
     """
 
     def __init__(self, policies: Mapping[str, Policy], n: int, *, start: str) -> None:
@@ -30,6 +36,7 @@ class Driver:
         self.gait: Int[np.ndarray, " N"] = np.full(n, self.gaits.index(start))
         self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._unmoved: Bool[np.ndarray, " N"] = np.zeros(n, dtype=bool)  # since a shift
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
         self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []
@@ -64,6 +71,11 @@ class Driver:
             )
             self.machine_state[ids] = step.state
             self.steps_in_state[ids] = np.where(step.changed, 0, self.steps_in_state[ids] + 1)
+            self._unmoved[ids] &= ~step.changed
+            stuck = ids[self._unmoved[ids] & (self.steps_in_state[ids] > STUCK * stride[ids])]
+            self.machine_state[stuck] = self._machines[index].initial
+            self.steps_in_state[stuck] = 0
+            self._unmoved[stuck] = False
 
     def switch(self, ids: Int[np.ndarray, " K"], gait: str, motion: Motion) -> None:
         """Robots `ids` take up another gait at once; those already in it are left alone."""
@@ -73,6 +85,7 @@ class Driver:
         self.gait[ids] = index
         self.machine_state[ids] = self._machines[index].enter(motion.contact[ids])
         self.steps_in_state[ids] = 0
+        self._unmoved[ids] = True
 
     def act(self, motion: Motion, command: Command) -> Float[np.ndarray, "N 12"]:
         """Joint targets [rad] for the next control step."""
