@@ -320,22 +320,22 @@ def test_a_machine_that_a_shift_began_and_that_stands_still_begins_anew(policies
     driver.see(standing, command)
     assert driver.machine_state.tolist() == [0, 0, 0]
     assert driver.steps_in_state.tolist() == [0, 0, 81]
-    for _ in range(200):
+    for _ in range(81 + 30):
         driver.see(standing, command)
-    assert driver.steps_in_state.tolist() == [200, 200, 281], "it waits for its feet from there on"
+    assert driver.steps_in_state.tolist() == [30, 30, 192], "once more, for as long as it stands"
 
 
-def test_a_machine_that_has_moved_since_the_shift_may_stand_still(policies):
-    driver = Driver(policies, 1, start="bound")
-    command = replace(driver.own_command(), stride_frequency=np.full(1, 2.5))
-    driver.switch(np.array([0]), "trot", motion_of(["FL BR"]))
-    for feet in ["FL BR"] * 25 + ["FR BL"]:
-        driver.see(motion_of([feet]), command)
-    assert driver.machine_state.tolist() == [1]
-    for _ in range(200):
-        driver.see(motion_of(["FL FR BL BR"]), command)
-    assert driver.machine_state.tolist() == [1]
-    assert driver.steps_in_state.tolist() == [200]
+def test_a_machine_that_has_gone_round_since_the_shift_may_stand_still(policies):
+    driver = Driver(policies, 2, start="bound")
+    command = replace(driver.own_command(), stride_frequency=np.full(2, 2.5))
+    driver.switch(np.arange(2), "trot", motion_of(["FL BR"] * 2))
+    for feet in [("FL BR", "FL BR")] * 25 + [("FR BL", "FR BL")] * 25 + [("FL BR", "FR BL")]:
+        driver.see(motion_of(feet), command)
+    assert driver.machine_state.tolist() == [0, 1], "round, and half round"
+    for _ in range(100):
+        driver.see(motion_of(["FL FR BL BR"] * 2), command)
+    assert driver.steps_in_state.tolist() == [100, 100 - (81 - 25)]
+    assert driver.machine_state.tolist() == [0, 0]
 
 
 def test_after_a_switch_the_new_policy_is_shown_its_own_machine_and_the_last_action(policies):

@@ -13,9 +13,10 @@ from gaitshift.policy import Policy
 from gaitshift.robot import Robot
 
 STUCK = 2.0
-"""Strides for which a machine that a shift began may stand still, until it begins anew as at the
-start of an episode; ours: a walk that is taken up from a fast gait may come to a stand on four feet
-in a state in which no episode of its training stood, and out of which it knows no way."""
+"""Strides for which a machine that a shift began may stand still before it has gone round once;
+then it begins anew as at the start of an episode. Ours: a walk that is taken up from a fast gait
+may come to a stand on four feet in a state in which no episode of its training stood, and out of
+which it knows no way."""
 
 
 class Driver:
@@ -36,7 +37,8 @@ class Driver:
         self.gait: Int[np.ndarray, " N"] = np.full(n, self.gaits.index(start))
         self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        self._unmoved: Bool[np.ndarray, " N"] = np.zeros(n, dtype=bool)  # since a shift
+        # Changes of state until a machine that a shift began has gone round once.
+        self._changes_due: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
         self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []
@@ -71,11 +73,11 @@ class Driver:
             )
             self.machine_state[ids] = step.state
             self.steps_in_state[ids] = np.where(step.changed, 0, self.steps_in_state[ids] + 1)
-            self._unmoved[ids] &= ~step.changed
-            stuck = ids[self._unmoved[ids] & (self.steps_in_state[ids] > STUCK * stride[ids])]
-            self.machine_state[stuck] = self._machines[index].initial
-            self.steps_in_state[stuck] = 0
-            self._unmoved[stuck] = False
+            self._changes_due[ids] -= step.changed
+            is_stuck = (self._changes_due[ids] > 0) & (
+                self.steps_in_state[ids] > STUCK * stride[ids]
+            )
+            self._begin(ids[is_stuck], index, self._machines[index].initial)
 
     def switch(self, ids: Int[np.ndarray, " K"], gait: str, motion: Motion) -> None:
         """Robots `ids` take up another gait at once; those already in it are left alone."""
@@ -83,9 +85,15 @@ class Driver:
         index = self.gaits.index(gait)
         ids = ids[self.gait[ids] != index]
         self.gait[ids] = index
-        self.machine_state[ids] = self._machines[index].enter(motion.contact[ids])
+        self._begin(ids, index, self._machines[index].enter(motion.contact[ids]))
+
+    def _begin(
+        self, ids: Int[np.ndarray, " K"], index: int, state: Int[np.ndarray, " K"] | int
+    ) -> None:
+        """The machines of these robots, of gait number `index`, begin in a state."""
+        self.machine_state[ids] = state
         self.steps_in_state[ids] = 0
-        self._unmoved[ids] = True
+        self._changes_due[ids] = len(self._machines[index].states)
 
     def act(self, motion: Motion, command: Command) -> Float[np.ndarray, "N 12"]:
         """Joint targets [rad] for the next control step."""
