@@ -364,11 +364,12 @@ def test_the_plain_bench_measures_the_speed_and_does_without_torch(capsys, monke
     assert "'torch' is missing" in said.err
 
 
-def test_the_help_tells_both_measurements_apart(capsys):
+def test_the_help_tells_the_measurements_apart(capsys):
     with pytest.raises(SystemExit):
         main(["bench", "--help"])
     told = capsys.readouterr().out
-    assert all(word in told for word in ("{speed,time-to-gait}", "--baseline-budget", "--robots"))
+    words = ("{speed,time-to-gait,page,replay}", "--baseline-budget", "--robots", "--page-seconds")
+    assert all(word in told for word in words)
 
 
 def test_the_replay_is_measured_with_and_without_a_leak(capsys, monkeypatch):

@@ -46,12 +46,16 @@ class TimeToGaitOptions:
 class Bench:
     """Measure how fast it is.
 
-    `speed`: steps a second of the environment, beside bare physics in the same run, and of
-    training. `time-to-gait`: training until trot, pace and bound first pass a check on flat ground
-    (survival ≥ 0.99, speed within 0.1 m/s, pattern fraction ≥ 0.6), beside stable-baselines3's PPO
-    at its defaults with 30 robots; hours, most of them the baseline's. `page`: whether the page of
-    `gaitshift view` keeps real time on one core, drawing 50 times a second. `replay`: how long
-    `identify` takes for 1000 episodes of 20 s, 100 α and 1000 β.
+    speed: steps a second of the environment, beside bare physics in the same run, and of training.
+
+    time-to-gait: training until trot, pace and bound first pass a check on flat ground, with
+    survival ≥ 0.99, speed within 0.1 m/s and pattern fraction ≥ 0.6, beside stable-baselines3's PPO
+    at its defaults with 30 robots; hours, most of them the baseline's.
+
+    page: whether the page of `gaitshift view` keeps real time on one core, drawing 50 times a
+    second.
+
+    replay: how long `identify` takes for 1000 episodes of 20 s, 100 α and 1000 β.
     """
 
     what: Annotated[Literal["speed", "time-to-gait", "page", "replay"], tyro.conf.Positional] = (
