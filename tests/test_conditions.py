@@ -483,9 +483,10 @@ def test_on_constant_input_k_rises_by_epsilon_counts_less_leak_and_fires_when_to
 
 def test_beta_in_time_is_when_a_robot_fires_whose_values_all_count():
     """The paper's 1000 counts at 100 Hz: 6 pairs, so the 167th step."""
-    rough, flat = Condition.paper().rough, Condition.paper().flat
-    assert rough.soonest(6) == pytest.approx(1.67)
-    assert flat.soonest(6) == pytest.approx(10.01), "below counts steps, not pairs"
+    paper = Condition.paper()
+    rough = paper.rough
+    assert paper.soonest(shifted=False) == pytest.approx(1.67)
+    assert paper.soonest(shifted=True) == pytest.approx(10.01), "below counts steps, not pairs"
     k, steps = np.zeros(1), 0
     while not rough.fires(k, np.ones(1))[0]:
         k, steps = rough.step(k, np.full((1, 6), 0.3)), steps + 1

@@ -105,6 +105,12 @@ class Condition:
             hold=self.hold,
         )
 
+    def soonest(self, *, shifted: bool) -> float:
+        """What β, or β' where `shifted`, is in time [s] (`Rule.soonest`)."""
+        if shifted:
+            return self.flat.soonest((self.statistic_back or self.statistic).width)
+        return self.rough.soonest(self.statistic.width)
+
     @classmethod
     def paper(cls) -> "Condition":
         """The paper's setting (IV-C): α = 0.2 m, β = 1000, ε = 1, body frame.

@@ -24,7 +24,7 @@ class Driver:
 
     A change of gait replaces policy and machine at once (paper III-E); the new machine starts in
     the state that fits the present contacts best (ours, the paper is silent), and begins anew where
-    it has not moved for `STUCK` strides.
+    it comes to a stand before it has gone round once (`STUCK`).
     """
 
     def __init__(self, policies: Mapping[str, Policy], n: int, *, start: str) -> None:

@@ -61,14 +61,6 @@ class LiveConfig:
         """The two gaits and their condition as a graph."""
         return GaitGraph.of(self.condition, flat=self.start, rough=self.rough_gait)
 
-    def soonest(self, gait: str) -> float:
-        """β of the rule that ends this gait, in time [s]."""
-        condition = self.condition
-        if gait == self.start:
-            return condition.rough.soonest(condition.statistic.width)
-        back = condition.statistic if condition.statistic_back is None else condition.statistic_back
-        return condition.flat.soonest(back.width)
-
 
 class LiveRun:
     """N robots on a track. Not for several threads at once."""

@@ -287,7 +287,9 @@ class LivePage:
         state = "fallen" if frame.fallen[0] else f"{frame.speed[0]:.2f} m/s"
         count = "–"
         if frame.threshold[0]:
-            soonest = self._live.config.soonest(self._live.gaits[int(frame.gait[0])])
+            config = self._live.config
+            shifted = self._live.gaits[int(frame.gait[0])] != config.start
+            soonest = config.condition.soonest(shifted=shifted)
             way = soonest * max(float(frame.speed[0]), 0.0)
             count = (
                 f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f} (β: {soonest:.2f} s, {way:.2f} m)"

@@ -45,10 +45,9 @@ def page_speed(robots: int, seconds: float, policies: Mapping[str, Policy]) -> d
     """
     if not 1.0 <= seconds <= 3600.0:
         raise GaitshiftError(f"a page for {seconds:g} s: 1 to 3600 would be right")
-    live = LiveRun(LiveConfig(robots=robots), policies)
     port = _free_port()
     with _on_one_core(), _served(port) as server:
-        page = LivePage(server, live, lambda log: "")
+        page = LivePage(server, LiveRun(LiveConfig(robots=robots), policies), lambda log: "")
         with _watched(f"ws://{_HOST}:{port}") as taken_in:
             start, spent = time.perf_counter(), time.process_time()
             before = taken_in.value
