@@ -184,6 +184,9 @@ def test_the_page_opens_without_a_network_and_its_slider_moves_the_robot(log, pa
 
     opened.evaluate("gaitshift.seek(0)")
     np.testing.assert_allclose(position(), log.qpos[0, 1, :3], atol=1e-4)
+    told = opened.locator("#charts .note").inner_text()
+    assert told.startswith("0.01 s")
+    assert "NaN" not in told, "of feet that have not touched yet there is nothing to tell"
     slider = opened.locator("#time")
     slider.fill("4")
     np.testing.assert_allclose(position()[0], log.qpos[400, 1, 0], atol=0.03)

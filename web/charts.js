@@ -5,6 +5,10 @@ import { ticks } from "./unpack.js";
 
 const LEFT = 58, RIGHT = 12, ROW = 92, BARS = 76, GAP = 30, AXIS = 34;
 
+/** A value with its unit; a dash where there is none yet. */
+const told = (value, { digits, unit }) =>
+  Number.isFinite(value) ? `${value.toFixed(digits)}${unit && " " + unit}` : "–";
+
 export function charts(holder, data, seek = null) {
   const canvas = document.createElement("canvas");
   canvas.setAttribute("role", "img");
@@ -64,7 +68,7 @@ export function charts(holder, data, seek = null) {
     const i = index(hover ?? now ?? last);
     note.textContent = (data.axis ? [`${data.axis} ${data.time[i]}`] : [`${data.time[i].toFixed(2)} s`, data.gaits[data.gait[i]].title])
       .concat(rows.filter((row) => row.kind === "lines").flatMap((row) =>
-        row.series.map((one) => `${one.name} ${one.values[i].toFixed(row.digits)}${row.unit && " " + row.unit}`)))
+        row.series.map((one) => `${one.name} ${told(one.values[i], row)}`)))
       .join("  ·  ");
   }
 
