@@ -176,4 +176,5 @@ def _text(value: str | float | None, nothing: str = "–") -> str:
         return nothing
     if isinstance(value, str):
         return value
-    return f"{value:g}" if value == int(value) else f"{value:.2f}"
+    told = round(value, 2)  # first, or 4.9999 is told as 5.00 and, read back from a table, as 5
+    return f"{told:g}" if told == int(told) else f"{told:.2f}"
