@@ -382,6 +382,33 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
 
 @pytest.mark.slow
 @browsing.needed
+def test_the_clock_and_the_ground_are_in_the_hands_of_whoever_looks(served, browser):
+    _, address = served("--track", "flat@200")
+    page, wrong = opened(browser, address)
+    wait_until(lambda: status(page)[2] > 3.0)
+    page.get_by_role("button", name="pause", exact=True).click()
+    page.get_by_role("button", name="go on", exact=True).wait_for()
+    time.sleep(1.0)  # what was on its way has come
+    stopped = status(page)[2]
+    for _ in range(12):
+        page.get_by_role("radio", name="one step").or_(page.get_by_text("one step")).first.click()
+        time.sleep(0.2)
+    wait_until(lambda: status(page)[2] == pytest.approx(stopped + 0.12, abs=0.06))
+    page.get_by_role("button", name="go on", exact=True).click()
+    page.get_by_text("restart", exact=True).first.click()
+    wait_until(lambda: status(page)[2] < stopped)
+    page.get_by_text("Ground", exact=True).click()
+    enter(page, "robots", 4)
+    page.get_by_role("button", name="walk there", exact=True).click()
+    wait_until(lambda: status(page)[2] < 1.0)
+    wait_until(lambda: status(page)[2] > 1.0)
+    picture = browsing.keep(page, "ghosts")
+    assert browsing.shows_a_robot(picture[:, : picture.shape[1] * 2 // 3]), "beside the panel"
+    assert not wrong
+
+
+@pytest.mark.slow
+@browsing.needed
 def test_a_click_records_a_log_and_a_page(served, browser, tmp_path):
     _, address = served("--track", "flat@200", "--robots", "2")
     page, wrong = opened(browser, address)
