@@ -85,10 +85,10 @@ def twins(gait, robot, *, steps=STEPS):
         base_velocity_w=pair(velocity, ACROSS * velocity),
     )
     env._touch_height = last_touch(env.world.motion)
-    env._heading = pair(heading, -heading)
+    env._commander.heading = pair(heading, -heading)
     env._state = pair(np.zeros(ROBOTS, dtype=int), np.full(ROBOTS, MIRRORED[gait][0]))
-    env._command = replace(
-        env._command,
+    env._commander.command = replace(
+        env._commander.command,
         forward_speed=pair(speed, speed),
         stride_frequency=pair(frequency, frequency),
     )

@@ -10,7 +10,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
-from gaitshift.command import ACTION_LIMIT, CONTROL_PERIOD, Command
+from gaitshift.command import ACTION_LIMIT
+from gaitshift.env.commander import Commander
 from gaitshift.env.config import EnvConfig
 from gaitshift.env.mixed_start import MixedStart, mix
 from gaitshift.env.swings import Swings
@@ -96,7 +97,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         self.world.push(self._pusher.step())
         motion = self.world.step(self._stance + self.robot.action_scale * action)
-        dwell = self.machine.dwell_for(self._command.stride)
+        dwell = self.machine.dwell_for(self._commander.command.stride)
         step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
         on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
         chatter, swing_share = self._swings.see(self._state, step, motion, self.swing_factor)
@@ -107,7 +108,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         terms = walk_reward(
             self.config.reward,
             motion,
-            self._command,
+            self._commander.command,
             stance=self._stance,
             agreement=agreement,
             chatter=self.strictness * chatter,
@@ -164,9 +165,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._touch_height: Float[np.ndarray, "N 4"] = np.zeros((n, 4))
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
-        self._line: Float[np.ndarray, " N"] = np.zeros(n)
-        self._heading: Float[np.ndarray, " N"] = np.zeros(n)
-        self._command = self._own_command(n)
+        self._commander = Commander(self.machine, self.config, n, rng)
 
     def _next_observation(self, done: Bool[np.ndarray, " N"], info: dict[str, Any]) -> Observations:
         self._update_command()
@@ -199,10 +198,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._touch_height[ids] = last_touch(self.world.motion)[ids]
         self._age[ids] = 0
         self._last_action[ids] = 0.0
-        self._line[ids] = self._heading[ids] = yaw
         if start is not None:
-            self._set_going(moving, start)
-        self._draw_commands(ids)
+            self._set_going(moving, start, yaw[np.isin(ids, moving)])
+        self._commander.restart(ids, yaw, self.command_scale)
         self._update_command()
 
     def _draw_mixed(
@@ -224,9 +222,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             rng=self._rng,
         )
 
-    def _set_going(self, ids: Int[np.ndarray, " M"], start: MixedStart) -> None:
+    def _set_going(
+        self, ids: Int[np.ndarray, " M"], start: MixedStart, yaw: Float[np.ndarray, " M"]
+    ) -> None:
         """Robots that stand at their starting points go on as if they had been on their way."""
-        turn = self._line[ids] - start.yaw
+        turn = yaw - start.yaw
         c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
         self.world.place(
             ids,
@@ -263,57 +263,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         return all(terrain.is_flat for terrain in self.world.terrains)
 
     def _update_command(self) -> None:
-        """Draws commands that are due anew, and turns every robot towards its heading."""
-        config = self.config
-        due = np.flatnonzero(self._age % config.command_interval == config.command_interval - 1)
-        if due.size and config.heading_range > 0:
-            turn = self._rng.uniform(-config.heading_range, config.heading_range, due.size)
-            self._heading[due] = self._line[due] + turn
-        if due.size:
-            self._draw_commands(due)
-        if config.heading_range > 0:
-            yaw_rate = config.heading_loop.yaw_rate(self.world.motion.yaw, self._heading)
-            self._command = replace(self._command, yaw_rate=yaw_rate)
+        self._commander.update(self._age, self.world.motion.yaw, self.command_scale)
 
     def commands(self) -> dict[str, Any]:
         """What may be commanded: own value and range of forward speed and stride frequency."""
-        own, machine = self._own_command(1), self.machine
-        speed, frequency = float(own.forward_speed[0]), float(own.stride_frequency[0])
-        slow, fast = (1.0 / (machine.stride(d) * CONTROL_PERIOD) for d in machine.dwell_range[::-1])
-        varied = self.config.command_share > 0
-        return {
-            "forward_speed": speed,
-            "speed_range": list(machine.speed_range) if varied else [speed, speed],
-            "stride_frequency": frequency,
-            "stride_frequency_range": [slow, fast] if varied else [frequency, frequency],
-        }
-
-    def _own_command(self, n: int) -> Command:
-        """Straight ahead, at the gait's own speed and frequency but for what the config says."""
-        machine, speed = self.machine, self.config.forward_speed
-        frequency = 1.0 / (machine.stride() * CONTROL_PERIOD)
-        return Command.straight(n, machine.speed if speed is None else speed, frequency)
-
-    def _draw_commands(self, ids: Int[np.ndarray, " K"]) -> None:
-        """Gives these robots a speed and a stride frequency, each drawn or the gait's own."""
-        share, scale = self.config.command_share, self.command_scale
-        if share == 0 or scale == 0:
-            return
-        machine, rng, own = self.machine, self._rng, self._own_command(len(ids))
-        drawn = rng.random((2, len(ids))) < share
-        home = own.forward_speed
-        speed = rng.uniform(*machine.speed_range, len(ids))
-        low, high = machine.dwell_range
-        dwell = machine.dwell + scale * (rng.uniform(low, high, len(ids)) - machine.dwell)
-        strides = np.array([machine.stride(d) for d in np.rint(dwell).astype(int).tolist()])
-        speeds, frequencies = (
-            getattr(self._command, name).copy() for name in ("forward_speed", "stride_frequency")
-        )
-        speeds[ids] = np.where(drawn[0], home + scale * (speed - home), home)
-        frequencies[ids] = np.where(
-            drawn[1], 1.0 / (strides * CONTROL_PERIOD), own.stride_frequency
-        )
-        self._command = replace(self._command, forward_speed=speeds, stride_frequency=frequencies)
+        return self._commander.ranges()
 
     def _observation(self) -> Observations:
         return self.observe(
@@ -321,7 +275,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
                 machine_state=self._state,
                 steps_in_state=self._steps_in_state,
                 motion=self.world.motion,
-                command=self._command,
+                command=self._commander.command,
                 last_action=self._last_action,
                 stance=self._stance,
                 touch_height=self._touch_height,
