@@ -44,7 +44,9 @@ class LivePage:
         self._scene = Scene(server, live.robot, live.gaits)
         self._tape = Tape()
         self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._paused, self._single = False, False
+        self._paused = False
+        self._singles = 0  # single steps that are asked for
+        self._last: Frame | None = None
         self._factor = 1.0
         self._owed = 0.0
         self.pictures = 0
@@ -70,16 +72,15 @@ class LivePage:
 
     def _advance(self) -> Frame | None:
         """The steps that are due, and the last frame; None where nothing moved."""
-        if self._paused and not self._single:
-            return None
-        self._owed = 1.0 if self._single else self._owed + _STEPS * self._factor
-        self._single = False
+        self._owed = float(self._singles) if self._paused else self._owed + _STEPS * self._factor
+        self._singles = 0
         frame: Frame | None = None
         while self._owed >= 1.0:
             self._owed -= 1.0
             frame = self._live.step()
             self.walked += CONTROL_PERIOD
             self._tape.add(frame)
+        self._last = frame or self._last
         if self._live.is_over:
             self._restart(replace(self._live.config, seed=self._live.config.seed + 1))
         return frame
@@ -121,6 +122,8 @@ class LivePage:
         def toggle() -> None:
             self._paused = not self._paused
             pause.label = "go on" if self._paused else "pause"
+            if self._last is not None:
+                self._tell(self._last)
 
         self._on_click(pause, toggle)
 
@@ -128,7 +131,7 @@ class LivePage:
             if chosen == "restart":
                 self._restart(self._live.config)
             else:
-                self._single = True
+                self._singles += 1
 
         self._on_choice(others, other)
         self._on_update(pace, lambda: setattr(self, "_factor", float(pace.value)))
@@ -284,6 +287,7 @@ class LivePage:
     def _tell(self, frame: Frame) -> None:
         gait = self._live.gaits[int(frame.gait[0])].replace("_", "-")
         x = float(frame.qpos[0, 0])
+        clock = f"{frame.time:.2f} s" if self._paused else f"{frame.time:.1f} s"
         state = "fallen" if frame.fallen[0] else f"{frame.speed[0]:.2f} m/s"
         count = "–"
         if frame.threshold[0]:
@@ -294,7 +298,7 @@ class LivePage:
             count = (
                 f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f} (β: {soonest:.2f} s, {way:.2f} m)"
             )
-        self._status.content = f"**{gait}** · {state} · {x:.1f} m · {frame.time:.1f} s · {count}"
+        self._status.content = f"**{gait}** · {state} · {x:.1f} m · {clock} · {count}"
 
 
 def _amplitude(track: str) -> float:
