@@ -354,6 +354,17 @@ def enter(page, label, number):
     box.press("Enter")
 
 
+def box_of(page, label):
+    """The box that this label stands before."""
+    return page.locator("label").get_by_text(label, exact=True).locator("xpath=following::input[1]")
+
+
+def pause(page):
+    """Until the page tells, to the step, where it stopped."""
+    page.get_by_role("button", name="pause", exact=True).click()
+    page.locator("p", has_text=re.compile(r"· \d+\.\d\d s ·")).wait_for()
+
+
 def gait_is(page, gait):
     return lambda: status(page)[0] == gait
 
@@ -386,23 +397,74 @@ def test_the_clock_and_the_ground_are_in_the_hands_of_whoever_looks(served, brow
     _, address = served("--track", "flat@200")
     page, wrong = opened(browser, address)
     wait_until(lambda: status(page)[2] > 3.0)
-    page.get_by_role("button", name="pause", exact=True).click()
-    page.get_by_role("button", name="go on", exact=True).wait_for()
-    page.locator("p", has_text=re.compile(r"· \d+\.\d\d s ·")).wait_for()  # where it stopped
+    pause(page)
     stopped = status(page)[2]
     for _ in range(12):
         page.get_by_role("radio", name="one step").or_(page.get_by_text("one step")).first.click()
     wait_until(lambda: status(page)[2] == pytest.approx(stopped + 0.12, abs=1e-6))
-    page.get_by_role("button", name="go on", exact=True).click()
     page.get_by_text("restart", exact=True).first.click()
-    wait_until(lambda: status(page)[2] < stopped)
+    wait_until(lambda: status(page)[2] == 0.01)
+    page.get_by_role("button", name="go on", exact=True).click()
+    wait_until(lambda: status(page)[2] > 1.0)
     page.get_by_text("Ground", exact=True).click()
     enter(page, "robots", 4)
+    pause(page)
     page.get_by_role("button", name="walk there", exact=True).click()
-    wait_until(lambda: status(page)[2] < 1.0)
+    wait_until(lambda: status(page)[2] == 0.01)
+    page.get_by_role("button", name="go on", exact=True).click()
     wait_until(lambda: status(page)[2] > 1.0)
     picture = browsing.keep(page, "ghosts")
     assert browsing.shows_a_robot(picture[:, : picture.shape[1] * 2 // 3]), "beside the panel"
+    assert not wrong
+
+
+@pytest.mark.slow
+@browsing.needed
+def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_path):
+    """What the sliders order stands in the recorded log, or is felt by the robot in it."""
+    _, address = served("--track", "perlin:0.1@300")
+    page, wrong = opened(browser, address)
+    page.get_by_label("shifts by itself").uncheck()
+    page.get_by_role("button", name="trot", exact=True).click()
+    wait_until(gait_is(page, "trot"))
+    enter(page, "α [m]", 0.005)  # with which it would shift at once
+    page.get_by_label("the gait's own speed and stride").uncheck()
+    enter(page, "speed [m/s]", 0.8)
+    enter(page, "stride [Hz]", 2.0)
+    walked = status(page)[1]
+    wait_until(lambda: status(page)[1] > walked + 3.0)
+    assert status(page)[0] == "trot"
+
+    page.get_by_text("Ground", exact=True).click()
+    box_of(page, "track").fill("flat@150")
+    box_of(page, "seed").fill("7")
+    pause(page)
+    page.get_by_role("button", name="walk there", exact=True).click()
+    wait_until(lambda: status(page)[2] == 0.01)
+    page.get_by_role("button", name="go on", exact=True).click()
+    page.get_by_text("Recording", exact=True).click()
+    page.get_by_role("button", name="record", exact=True).click()
+    begun = status(page)[2]
+    wait_until(lambda: status(page)[2] > begun + 2.0)
+    enter(page, "force [N]", 200)
+    box_of(page, "direction").click()
+    page.get_by_role("option", name="right", exact=True).click()
+    page.get_by_role("button", name="push", exact=True).click()
+    clicked = status(page)[2]
+    wait_until(lambda: status(page)[2] > clicked + 1.0)
+    page.get_by_role("button", name="end and save", exact=True).click()
+    page.get_by_text("opens from disk").first.wait_for()
+    log = Log.load(tmp_path / "recorded" / "log-1.npz")
+    assert log.terrain.startswith("flat@150,")
+    assert np.allclose(log.command[-1, 0, 0], 0.8)
+    to_the_right = -log.qvel[:, 0, 1]
+    assert to_the_right.max() > max(0.5, 2 * np.abs(to_the_right[:150]).max()), "the push"
+
+    enter(page, "times real time", 0.1)
+    time.sleep(1.0)
+    begun, clock = status(page)[2], time.monotonic()
+    time.sleep(5.0)
+    assert status(page)[2] - begun < 0.15 * (time.monotonic() - clock) + 0.2
     assert not wrong
 
 

@@ -257,6 +257,7 @@ class LivePage:
         self._save_recording()
         before = self._live.ground
         self._live.restart(config)
+        self._singles = 1  # so that a page that is paused shows where they begin
         self._tape.clear()
         self._seed.value = config.seed
         if self._live.ground is not before:
