@@ -242,7 +242,18 @@ def test_smoothing_keeps_straight_lines_and_stills_trembling():
     t = np.arange(300) / 100
     line = 3.0 - 2.0 * t
     assert np.allclose(smoothed(line, 0.01, 0.5), line)
-    assert np.abs(smoothed(np.sin(2 * np.pi * 5 * t), 0.01, 0.3)[90:-90]).max() < 1e-3
+    trembling = smoothed(np.sin(2 * np.pi * 5 * t), 0.01, 0.3)
+    assert np.abs(trembling[90:-90]).max() < 1e-3
+    assert np.abs(trembling).max() < 0.25, "its ends are not tied to the last step"
+
+
+def test_smoothing_is_a_weighted_line_through_each_window():
+    t, rng = np.arange(120) / 100, np.random.default_rng(0)
+    values = rng.normal(size=120)
+    for i, value in enumerate(smoothed(values, 0.01, 0.25)):
+        weights = np.exp(-0.5 * ((t - t[i]) / 0.25) ** 2) * (np.abs(t - t[i]) < 0.7501)
+        _, expected = np.polyfit(t - t[i], values, 1, w=np.sqrt(weights))
+        assert value == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.fixture

@@ -139,8 +139,8 @@ def rollout(
         walk.step(recorder.add)
         if step % 25 == 24:
             report(step + 1, config.steps)
-            if (walk.fallen | (world.motion.base_position_w[:, 0] > finish_x)).all():
-                break
+        if (walk.fallen | (world.motion.base_position_w[:, 0] >= finish_x)).all():
+            break
     report(config.steps, config.steps)
     return recorder.log()
 

@@ -129,10 +129,17 @@ def _ground_below_feet(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
 def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:
     """Values every `step` [s], averaged in a Gaussian window of standard deviation `sigma` [s].
 
-    The window looks both ways, so nothing is delayed; beyond its ends a course goes on as its
-    mirror image through the end point, so that a straight line stays one.
+    The window looks both ways, so nothing is delayed. Each point is the middle of the line that fits
+    best in its window (locally linear regression), so that a straight line stays one up to its ends,
+    where half of the window is empty.
     """
     reach = int(np.ceil(3 * sigma / step))
-    weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / sigma) ** 2)
-    padded = np.pad(values, reach, mode="reflect", reflect_type="odd")
-    return np.convolve(padded, weights / weights.sum(), mode="valid")
+    offset = np.arange(-reach, reach + 1)
+    weights = np.exp(-0.5 * (offset * step / sigma) ** 2)
+
+    def summed(course: Float[np.ndarray, " T"], power: int) -> Float[np.ndarray, " T"]:
+        return np.correlate(np.pad(course, reach), weights * offset**power, mode="valid")
+
+    s0, s1, s2 = (summed(np.ones(len(values)), power) for power in range(3))
+    total, moment = summed(values, 0), summed(values, 1)
+    return (s2 * total - s1 * moment) / (s0 * s2 - s1**2)
