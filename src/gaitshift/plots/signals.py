@@ -129,9 +129,9 @@ def _ground_below_feet(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
 def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:
     """Values every `step` [s], averaged in a Gaussian window of standard deviation `sigma` [s].
 
-    The window looks both ways, so nothing is delayed. Each point is the middle of the line that fits
-    best in its window (locally linear regression), so that a straight line stays one up to its ends,
-    where half of the window is empty.
+    The window looks both ways, so nothing is delayed. Each point is the middle of the line that
+    fits best in its window (locally linear regression), so that a straight line stays one up to
+    its ends, where half of the window is empty.
     """
     reach = int(np.ceil(3 * sigma / step))
     offset = np.arange(-reach, reach + 1)
