@@ -22,7 +22,8 @@ from gaitshift.log import Log
 from gaitshift.switching import load_condition
 from gaitshift.terrain import from_spec
 from gaitshift.viewer.charts import contact_svg, counter, machine_svg
-from gaitshift.viewer.live import LiveConfig, LiveRun, with_amplitude
+from gaitshift.viewer.live import LiveConfig, LiveRun
+from gaitshift.viewer.panels import with_amplitude
 from gaitshift.viewer.tape import WINDOW, Tape
 
 TRACK = "flat@3,perlin:0.12@5,flat@2"

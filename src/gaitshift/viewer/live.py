@@ -216,16 +216,5 @@ class LiveRun:
         )
 
 
-def with_amplitude(track: str, amplitude: float) -> str:
-    """A track whose pieces of noise have this amplitude [m]."""
-    pieces = [piece.strip() for piece in track.split(",")]
-    return ",".join(
-        f"perlin:{amplitude:.3f}@{piece.split('@')[1]}"
-        if piece.startswith("perlin:") and "@" in piece
-        else piece
-        for piece in pieces
-    )
-
-
 DIRECTIONS = {"left": np.pi / 2, "right": -np.pi / 2, "forwards": 0.0, "backwards": np.pi}
 """Of pushes, by name [rad]."""

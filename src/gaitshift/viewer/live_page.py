@@ -1,7 +1,5 @@
 """The live page: robots walk, and whoever looks at it gives orders."""
 
-import math
-import queue
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
@@ -12,9 +10,10 @@ from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
 from gaitshift.geometry import Frame
 from gaitshift.log import Log
-from gaitshift.switching import CONDITIONS, Condition
 from gaitshift.viewer.charts import Charts
-from gaitshift.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, LiveRun, with_amplitude
+from gaitshift.viewer.live import LiveConfig, LiveRun
+from gaitshift.viewer.orders import Orders
+from gaitshift.viewer.panels import build_condition, build_gaits, build_ground, build_push
 from gaitshift.viewer.scene import Scene
 from gaitshift.viewer.server import TICK, Clock
 from gaitshift.viewer.tape import Tape
@@ -24,9 +23,6 @@ _CHARTS_EVERY = 6
 
 _STEPS = round(TICK / CONTROL_PERIOD)
 """Control steps from picture to picture at real time."""
-
-_GAITS_A_ROW = 4
-"""Buttons for gaits beside each other."""
 
 
 class LivePage:
@@ -43,7 +39,7 @@ class LivePage:
         self._live = live
         self._scene = Scene(server, live.robot, live.gaits)
         self._tape = Tape()
-        self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._orders = Orders()
         self._paused = False
         self._singles = 0  # single steps that are asked for
         self._last: Frame | None = None
@@ -60,7 +56,7 @@ class LivePage:
         """Walks and draws until told to end, or for ever."""
         clock = Clock()
         while not until():
-            self._obey()
+            self._orders.obey(self._refuse)
             frame = self._advance()
             if frame is not None:
                 self._scene.draw(frame)
@@ -88,7 +84,7 @@ class LivePage:
     # What stands in the panels --------------------------------------------------------------------
 
     def _build(self) -> None:
-        gui, config = cast(Any, self._server.gui), self._live.config
+        gui = cast(Any, self._server.gui)
         panel = gui.add_panel()
         with panel.add_tab("Signals"):
             self._charts = Charts(self._server, self._live.machines)
@@ -97,21 +93,16 @@ class LivePage:
         self._status = gui.add_markdown("")
         self._build_clock(gui)
         with gui.add_folder("Gait"):
-            self._build_gaits(gui, config)
+            build_gaits(gui, self._orders, self._live)
         with gui.add_folder("Condition"):
-            self._build_condition(gui, config.condition)
+            build_condition(gui, self._orders, self._live)
         with gui.add_folder("Push"):
-            force = gui.add_slider("force [N]", min=0, max=300, step=10, initial_value=120)
-            way = gui.add_dropdown("direction", tuple(DIRECTIONS), initial_value="left")
-            self._on_click(
-                gui.add_button("push"),
-                lambda: self._live.push(float(force.value), DIRECTIONS[way.value]),
-            )
+            build_push(gui, self._orders, self._live)
         with gui.add_folder("Ground", expand_by_default=False):
-            self._build_ground(gui, config)
+            self._seed = build_ground(gui, self._orders, self._live, self._restart)
         with gui.add_folder("Recording", expand_by_default=False):
             self._record = gui.add_button("record")
-            self._on_click(self._record, self._toggle_recording)
+            self._orders.on_click(self._record, self._toggle_recording)
 
     def _build_clock(self, gui: Any) -> None:
         pause = gui.add_button("pause")
@@ -125,7 +116,7 @@ class LivePage:
             if self._last is not None:
                 self._tell(self._last)
 
-        self._on_click(pause, toggle)
+        self._orders.on_click(pause, toggle)
 
         def other(chosen: str) -> None:
             if chosen == "restart":
@@ -133,125 +124,9 @@ class LivePage:
             else:
                 self._singles += 1
 
-        self._on_choice(others, other)
-        self._on_update(pace, lambda: setattr(self, "_factor", float(pace.value)))
-        self._on_update(follow, lambda: setattr(self._scene, "follows", bool(follow.value)))
-
-    def _build_gaits(self, gui: Any, config: LiveConfig) -> None:
-        alone = gui.add_checkbox(
-            "shifts by itself", config.is_autonomous, hint="trot on flat, bound on rough ground"
-        )
-        self._on_update(alone, lambda: self._change(is_autonomous=bool(alone.value)))
-        names = {gait.replace("_", "-"): gait for gait in self._live.gaits}
-        for row in range(0, len(names), _GAITS_A_ROW):
-            some = gui.add_button_group("", tuple(names)[row : row + _GAITS_A_ROW])
-            self._on_choice(some, lambda chosen: self._live.take(names[chosen]))
-        own = gui.add_checkbox("the gait's own speed and stride", True)
-        speed = gui.add_slider(
-            "speed [m/s]", min=0.2, max=1.6, step=0.05, initial_value=1.2, disabled=True
-        )
-        stride = gui.add_slider(
-            "stride [Hz]", min=1.0, max=3.5, step=0.1, initial_value=2.5, disabled=True
-        )
-
-        def command() -> None:
-            speed.disabled = stride.disabled = bool(own.value)
-            self._change(
-                speed=None if own.value else float(speed.value),
-                stride_frequency=None if own.value else float(stride.value),
-            )
-
-        for handle in (own, speed, stride):
-            self._on_update(handle, command)
-
-    def _build_condition(self, gui: Any, condition: Condition) -> None:
-        names = tuple(CONDITIONS)
-        now = next((name for name in names if CONDITIONS[name] == condition), names[0])
-        name = gui.add_dropdown("condition", names, initial_value=now)
-        ranges = {
-            "alpha": ("α [m]", 0.001, 0.3, 0.001),
-            "beta": ("β [counts]", 0, 1500, 1),
-            "leak": ("leak [counts/step]", 0, 6, 0.01),
-            "alpha_back": ("α' [m]", 0.001, 0.3, 0.0005),
-            "beta_back": ("β' [counts]", 0, 1500, 1),
-        }
-        numbers = {
-            key: gui.add_slider(
-                label, min=low, max=high, step=step, initial_value=getattr(condition, key)
-            )
-            for key, (label, low, high, step) in ranges.items()
-        }
-
-        def tuned() -> None:
-            values = {key: float(handle.value) for key, handle in numbers.items()}
-            self._change(condition=replace(CONDITIONS[name.value], **values))
-
-        def choose() -> None:
-            for key, handle in numbers.items():
-                handle.value = getattr(CONDITIONS[name.value], key)
-            self._change(condition=CONDITIONS[name.value])
-
-        self._on_update(name, choose)
-        for handle in numbers.values():
-            self._on_update(handle, tuned)
-
-    def _build_ground(self, gui: Any, config: LiveConfig) -> None:
-        track = gui.add_text("track", config.track)
-        height = gui.add_slider(
-            "noise [m]", min=0.0, max=0.25, step=0.01, initial_value=_amplitude(config.track)
-        )
-        seed = gui.add_number("seed", config.seed, min=0, step=1)
-        robots = gui.add_slider(
-            "robots", min=1, max=MOST_ROBOTS, step=1, initial_value=config.robots
-        )
-
-        def walk_anew() -> None:
-            asked = {"track": track.value, "seed": int(seed.value), "robots": int(robots.value)}
-            self._restart(replace(self._live.config, **asked))
-
-        def raise_noise() -> None:
-            track.value = with_amplitude(track.value, float(height.value))
-
-        self._on_update(height, raise_noise)
-        self._on_click(gui.add_button("walk there"), walk_anew)
-        self._seed = seed
-
-    # Orders ---------------------------------------------------------------------------------------
-
-    def _on_click(self, button: Any, order: Callable[[], None]) -> None:
-        def enqueue(_: Any) -> None:
-            self._orders.put(order)
-
-        button.on_click(enqueue)
-
-    def _on_choice(self, group: Any, order: Callable[[str], None]) -> None:
-        def enqueue(event: Any) -> None:
-            chosen = str(event.target.value)
-            self._orders.put(lambda: order(chosen))
-
-        group.on_click(enqueue)
-
-    def _on_update(self, handle: Any, order: Callable[[], None]) -> None:
-        def enqueue(event: Any) -> None:
-            if event.client is not None:  # not what the page itself has set
-                self._orders.put(order)
-
-        handle.on_update(enqueue)
-
-    def _obey(self) -> None:
-        """Carries out the orders that came in; what cannot be done is told on the page."""
-        while True:
-            try:
-                order = self._orders.get_nowait()
-            except queue.Empty:
-                return
-            try:
-                order()
-            except GaitshiftError as error:
-                self._notify("that cannot be done", str(error), "red")
-
-    def _change(self, **values: Any) -> None:
-        self._live.change(replace(self._live.config, **values))
+        self._orders.on_choice(others, other)
+        self._orders.on_update(pace, lambda: setattr(self, "_factor", float(pace.value)))
+        self._orders.on_update(follow, lambda: setattr(self._scene, "follows", bool(follow.value)))
 
     def _restart(self, config: LiveConfig) -> None:
         self._save_recording()
@@ -281,6 +156,9 @@ class LivePage:
             return
         self._notify("recorded", self._save(log), "green")
 
+    def _refuse(self, error: GaitshiftError) -> None:
+        self._notify("that cannot be done", str(error), "red")
+
     def _notify(self, title: str, body: str, colour: str) -> None:
         for client in self._server.get_clients().values():
             cast(Any, client).add_notification(title, body, color=colour)
@@ -300,16 +178,3 @@ class LivePage:
                 f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f} (β: {soonest:.2f} s, {way:.2f} m)"
             )
         self._status.content = f"**{gait}** · {state} · {x:.1f} m · {clock} · {count}"
-
-
-def _amplitude(track: str) -> float:
-    """Of the first noise on a track, as far as the slider goes [m]."""
-    for piece in track.split(","):
-        kind, _, number = piece.strip().partition(":")
-        if kind == "perlin":
-            try:
-                amplitude = float(number.partition("@")[0])
-            except ValueError:
-                break
-            return min(amplitude, 0.25) if math.isfinite(amplitude) else 0.1
-    return 0.1
