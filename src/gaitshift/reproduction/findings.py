@@ -156,14 +156,14 @@ def _is_needed(reference: Seeds, other: Seeds) -> Verdict:
 def _speeds_up(reference: Seeds, other: Seeds) -> Verdict:
     fewer = other.moving / len(other) < reference.moving / len(reference)
     later = _or_never(other.move_from) > LATER * _or_never(reference.move_from)
-    return "holds" if fewer or later else "does not hold"
+    return _grade(fewer + (fewer or later), 2)
 
 
 def _is_spared(reference: Seeds, other: Seeds) -> Verdict:
     if reference.walking < len(reference):
         return _grade(reference.walking, len(reference))
-    later = _or_never(reference.walk_from) > LATER * _or_never(other.walk_from)
-    return "holds in part" if later else "holds"
+    quicker = _or_never(other.walk_from) > LATER * _or_never(reference.walk_from)
+    return "holds" if quicker else "holds in part"
 
 
 _COMPARISONS = {

@@ -112,7 +112,8 @@ def _introduction(results: Results) -> str:
             f"A run *walks* from the first iteration from which its mean speed stays above "
             f"{WALKING_SPEED:g} m/s and its machine changes state more than {WALKING_CHANGES:g} "
             f"times a second, {HELD_FOR} iterations running; *at the end* is the last tenth. "
-            "Figures of a training are those of robots that explore.",
+            "Figures of a training are those of robots that explore. Courses dip every "
+            f"{recipe.checkpoint_every} iterations: at a checkpoint all robots start anew.",
         )
     )
 
