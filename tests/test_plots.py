@@ -253,7 +253,7 @@ def test_smoothing_is_a_weighted_line_through_each_window():
     for i, value in enumerate(smoothed(values, 0.01, 0.25)):
         weights = np.exp(-0.5 * ((t - t[i]) / 0.25) ** 2) * (np.abs(t - t[i]) < 0.7501)
         _, expected = np.polyfit(t - t[i], values, 1, w=np.sqrt(weights))
-        assert value == pytest.approx(expected, abs=1e-3)
+        assert value == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.fixture

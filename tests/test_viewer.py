@@ -366,6 +366,21 @@ def pause(page):
     page.locator("p", has_text=re.compile(r"· \d+\.\d\d s ·")).wait_for()
 
 
+def begin_recording(page):
+    """And lets two seconds go."""
+    page.get_by_text("Recording", exact=True).click()
+    page.get_by_role("button", name="record", exact=True).click()
+    begun = status(page)[2]
+    wait_until(lambda: status(page)[2] > begun + 2.0)
+
+
+def end_recording(page, folder):
+    """The log that was saved."""
+    page.get_by_role("button", name="end and save", exact=True).click()
+    page.get_by_text("opens from disk").first.wait_for()
+    return Log.load(folder / "log-1.npz")
+
+
 def gait_is(page, gait):
     return lambda: status(page)[0] == gait
 
@@ -437,27 +452,25 @@ def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_
     assert status(page)[0] == "trot"
 
     page.get_by_text("Ground", exact=True).click()
-    box_of(page, "track").fill("flat@150")
+    box_of(page, "track").fill("perlin:0.02@150")
     box_of(page, "seed").fill("7")
     pause(page)
     page.get_by_role("button", name="walk there", exact=True).click()
     wait_until(lambda: status(page)[2] == 0.01)
     page.get_by_role("button", name="go on", exact=True).click()
-    page.get_by_text("Recording", exact=True).click()
-    page.get_by_role("button", name="record", exact=True).click()
-    begun = status(page)[2]
-    wait_until(lambda: status(page)[2] > begun + 2.0)
+    begin_recording(page)
     enter(page, "force [N]", 200)
     box_of(page, "direction").click()
     page.get_by_role("option", name="right", exact=True).click()
     page.get_by_role("button", name="push", exact=True).click()
     clicked = status(page)[2]
     wait_until(lambda: status(page)[2] > clicked + 1.0)
-    page.get_by_role("button", name="end and save", exact=True).click()
-    page.get_by_text("opens from disk").first.wait_for()
-    log = Log.load(tmp_path / "recorded" / "log-1.npz")
-    assert log.terrain.startswith("flat@150,")
-    assert np.allclose(log.command[-1, 0, 0], 0.8)
+    log = end_recording(page, tmp_path / "recorded")
+    assert log.terrain.startswith("perlin:0.02@150,")
+    with_seed = {seed: from_spec(log.terrain, seed=seed, length=1.0, width=8.0) for seed in (0, 7)}
+    assert np.allclose(log.terrain_height, with_seed[7].height, atol=1e-6)
+    assert not np.allclose(log.terrain_height, with_seed[0].height, atol=1e-3)
+    assert np.allclose(log.command[-1, 0], [0.8, 0.0, 2.0], atol=[1e-6, 0.5, 1e-6])
     to_the_right = -log.qvel[:, 0, 1]
     assert to_the_right.max() > max(0.5, 2 * np.abs(to_the_right[:150]).max()), "the push"
 
@@ -474,13 +487,8 @@ def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_
 def test_a_click_records_a_log_and_a_page(served, browser, tmp_path):
     _, address = served("--track", "flat@200", "--robots", "2")
     page, wrong = opened(browser, address)
-    page.get_by_text("Recording", exact=True).click()
-    page.get_by_role("button", name="record", exact=True).click()
-    begun = status(page)[2]
-    wait_until(lambda: status(page)[2] > begun + 2.0)
-    page.get_by_role("button", name="end and save", exact=True).click()
-    page.get_by_text("opens from disk").first.wait_for()
-    log = Log.load(tmp_path / "recorded" / "log-1.npz")
+    begin_recording(page)
+    log = end_recording(page, tmp_path / "recorded")
     assert log.k.shape[1] == 2
     assert len(log.time) > 150
     told = (tmp_path / "recorded" / "run-1.html").read_text()

@@ -156,7 +156,7 @@ def _is_needed(reference: Seeds, other: Seeds) -> Verdict:
 def _speeds_up(reference: Seeds, other: Seeds) -> Verdict:
     fewer = other.moving / len(other) < reference.moving / len(reference)
     later = _or_never(other.move_from) > LATER * _or_never(reference.move_from)
-    return _grade(fewer + (fewer or later), 2)
+    return _grade(fewer + later, 2)
 
 
 def _is_spared(reference: Seeds, other: Seeds) -> Verdict:
