@@ -21,7 +21,7 @@ from gaitshift.geometry import frames_of
 from gaitshift.log import Log
 from gaitshift.switching import load_condition
 from gaitshift.terrain import from_spec
-from gaitshift.viewer.charts import contact_svg, counter, machine_svg
+from gaitshift.viewer.charts import contact_svg, counter, foot_heights, machine_svg
 from gaitshift.viewer.live import LiveConfig, LiveRun
 from gaitshift.viewer.panels import with_amplitude
 from gaitshift.viewer.tape import WINDOW, Tape
@@ -225,6 +225,18 @@ def test_the_chart_of_k_marks_shifts_where_they_are_and_nowhere_else(policies):
         tape.add(run.step())
     _, _, shift = counter(tape)
     assert np.flatnonzero(shift).tolist() == [40]
+
+
+def test_the_chart_of_heights_is_silent_of_feet_that_have_not_touched(policies):
+    run, tape = LiveRun(LiveConfig(track="flat@40"), policies), Tape()
+    for _ in range(60):
+        tape.add(run.step())
+    touched = np.logical_or.accumulate(tape.of("contact"), axis=0)
+    assert not touched[0].all()
+    assert touched[-1].all()
+    heights = foot_heights(tape)
+    assert np.array_equal(np.isfinite(heights), touched)
+    assert (heights[touched] < -0.3).all(), "below the base"
 
 
 # The command --------------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ class Charts:
             return
         self._show_condition(bool((tape.of("threshold") + tape.of("k")).any()))
         self._counter.data = (time, *counter(tape))
-        self._heights.data = (time, *tape.of("foot_height").T.astype(float))
+        self._heights.data = (time, *foot_heights(tape).T)
         self._speed.data = (time, tape.of("speed").astype(float))
         gait, state = int(last.gait[tape.robot]), int(last.machine_state[tape.robot])
         machine = self._machines[gait]
@@ -89,6 +89,12 @@ def counter(tape: Tape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     changed = np.flatnonzero(gait[1:] != gait[:-1])
     shift[changed + 1] = np.maximum(np.maximum(k, beta)[changed], 1.0)
     return k.astype(float), beta.astype(float), shift
+
+
+def foot_heights(tape: Tape) -> np.ndarray:
+    """Heights of the last touches (T, 4) [m]; NaN of a foot that has not touched yet."""
+    touched = np.isfinite(tape.of("touch_w")[..., 0])
+    return np.where(touched, tape.of("foot_height"), np.nan)
 
 
 def contact_svg(tape: Tape, colours: tuple[str, ...]) -> str:
