@@ -1,6 +1,5 @@
 """Time to gait: the baseline's view of the environment, the check, the clock, the medians."""
 
-import csv
 import json
 import sys
 from dataclasses import replace
@@ -15,13 +14,22 @@ from gaitshift.benchmark import time_to_gait as race
 from gaitshift.benchmark.baseline import ROBOTS, Baseline
 from gaitshift.benchmark.check import Check, Figures
 from gaitshift.benchmark.ours import Ours
-from gaitshift.benchmark.outcome import Outcome, middle, ratio, ratio_text, summary, write_csv
+from gaitshift.benchmark.outcome import (
+    COLUMNS,
+    Outcome,
+    middle,
+    ratio,
+    ratio_text,
+    row_of,
+    summary,
+)
 from gaitshift.benchmark.time_to_gait import TimeToGait, time_to_gait
 from gaitshift.benchmark.vec_env import GaitVecEnv
 from gaitshift.cli import main
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.plots import time_to_gait_figure
+from gaitshift.table import read_rows, write_rows
 from gaitshift.terrain import flat
 from gaitshift.training.recipe import Recipe, Stage
 
@@ -214,6 +222,22 @@ def test_learners_take_turns_and_a_budget_of_nothing_leaves_the_baseline_out(mon
     assert [o.learner for o in time_to_gait(alone)] == ["gaitshift"] * alone.trainings
 
 
+def test_trainings_that_are_known_are_not_repeated_but_where_more_would_be_told(monkeypatch):
+    def told(entry, machine, seed, check):
+        return outcome(machine.name, entry.name, seconds=1.0, seed=seed)
+
+    monkeypatch.setattr(race, "_train", told)
+    config = TimeToGait(gaits=("trot",), seeds=3, baseline_budget=50.0)
+    known = [
+        outcome(seed=0, seconds=40.0),
+        outcome(learner="stable-baselines3", seed=0, seconds=51.0, reached=False),
+        outcome(learner="stable-baselines3", seed=1, seconds=49.0, reached=False),
+        outcome("pace", seed=1, seconds=40.0),
+        outcome(seed=2, seconds=2000.0, reached=False),
+    ]
+    assert [o.seconds for o in time_to_gait(config, known)] == [40.0, 51.0, 1.0, 1.0, 2000.0, 1.0]
+
+
 def test_the_full_measurement_is_the_flat_stage_of_the_default_recipe_and_the_papers_library():
     config = TimeToGait()
     assert config.recipe == replace(Recipe(), stages=Recipe().stages[:1])
@@ -265,11 +289,9 @@ def test_the_table_and_the_figure_show_every_training(tmp_path):
         )
         for seed, seconds in enumerate((base, 1.3 * base))
     ]
-    write_csv(outcomes, tmp_path / "time_to_gait.csv")
-    with (tmp_path / "time_to_gait.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert [float(row["seconds"]) for row in rows] == [o.seconds for o in outcomes]
-    assert [row["reached"] for row in rows] == [str(o.reached) for o in outcomes]
+    write_rows(tmp_path / "time_to_gait.csv", COLUMNS, [row_of(o) for o in outcomes])
+    rows = read_rows(tmp_path / "time_to_gait.csv", COLUMNS, "trainings")
+    assert [Outcome(**row) for row in rows] == outcomes
     figure = time_to_gait_figure(outcomes, tmp_path / "time_to_gait.png")
     axes = figure.axes[0]
     dots = [line.get_xdata()[0] for line in axes.lines if line.get_marker() == "o"]
@@ -304,6 +326,23 @@ def test_the_quick_measurement_runs_from_the_command_to_the_figure(capsys, tmp_p
     assert told["gaits"]["trot"]["ratio"] is None
     assert {file.name for file in out.iterdir()} == {"time_to_gait.csv", "time_to_gait.png"}
     assert len(said.err.strip().splitlines()) == 2, "a line a training"
+
+    table = out / "time_to_gait.csv"
+    before = table.read_text()
+    table.write_text("\n".join([*before.splitlines()[:2], ""]))  # as if broken off after one
+    main(["bench", "time-to-gait", "--quick", "--json", "--out", str(out)])
+    ours, baseline = (line.split(",") for line in table.read_text().splitlines()[1:])
+    assert ",".join(ours) == before.splitlines()[1]
+    assert baseline[1] == "stable-baselines3"
+
+
+def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):
+    table = tmp_path / "time_to_gait.csv"
+    write_rows(table, COLUMNS, [row_of(outcome())])
+    table.write_text(table.read_text().replace("True", "yes"))
+    line = refusal(capsys, "time-to-gait", "--quick", "--out", str(tmp_path))
+    assert str(table) in line
+    assert "'yes': True or False would be right" in line
 
 
 def test_ours_alone_is_measured_and_a_check_that_asks_for_nothing_is_passed_at_once():

@@ -13,9 +13,9 @@ from gaitshift.command import CONTROL_PERIOD
 from gaitshift.evaluation import DemoConfig, run_demo
 from gaitshift.plots.transitions import transition_map
 from gaitshift.studies import Pair, run_pair
-from gaitshift.studies.table import read_rows
 from gaitshift.studies.transition_table import COLUMNS
 from gaitshift.studies.transitions import measure_shifts, running_mean
+from gaitshift.table import read_rows
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 

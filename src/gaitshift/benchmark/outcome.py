@@ -1,11 +1,11 @@
 """How a training came out, as a line of a table, and what several seeds of it amount to."""
 
-import csv
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from math import floor
-from pathlib import Path
 from typing import Any
+
+from gaitshift.table import Columns, Row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,15 +84,26 @@ def _of_gait(outcomes: list[Outcome]) -> dict[str, Any]:
     }
 
 
-def write_csv(outcomes: Sequence[Outcome], path: Path) -> None:
-    """One line a training."""
-    with path.open("w", newline="") as file:
-        names = [field.name for field in fields(Outcome)]
-        lines = csv.DictWriter(file, names, lineterminator="\n")
-        lines.writeheader()
-        for outcome in outcomes:
-            lines.writerow(_rounded(asdict(outcome)))
+def _truth(text: str) -> bool:
+    if text not in ("True", "False"):
+        raise ValueError(f"'{text}': True or False would be right")
+    return text == "True"
 
 
-def _rounded(row: dict[str, Any]) -> dict[str, Any]:
+COLUMNS: Columns = {
+    "gait": str,
+    "learner": str,
+    "seed": int,
+    "reached": _truth,
+    "seconds": float,
+    "steps": int,
+    "survival": float,
+    "speed": float,
+    "pattern_fraction": float,
+}
+
+
+def row_of(outcome: Outcome) -> Row:
+    """The line of a table that an outcome is; `Outcome(**row)` is it again."""
+    row = asdict(outcome)
     return {name: round(x, 3) if isinstance(x, float) else x for name, x in row.items()}

@@ -1,7 +1,7 @@
 """Time to gait: how long training takes until a check is passed, beside a baseline's."""
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -97,9 +97,21 @@ class _Entry:
     most_steps: float = inf
     most_seconds: float = inf
 
+    def knows(self, known: Outcome, gait: str, seed: int) -> bool:
+        """Whether an outcome is this entry's, and no longer a training would tell more."""
+        if (known.learner, known.gait, known.seed) != (self.name, gait, seed):
+            return False
+        return known.reached or self.gives_up(known.steps, known.seconds)
 
-def time_to_gait(config: TimeToGait) -> Generator[Outcome]:
+    def gives_up(self, steps: int, seconds: float) -> bool:
+        """Whether a training has come to its limit."""
+        return steps >= self.most_steps or seconds >= self.most_seconds
+
+
+def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator[Outcome]:
     """Trains every gait from every seed, ours and the baseline in turn; an outcome at a time.
+
+    Those that are `known` already are told as they are.
 
     Raises:
         GaitshiftError: a package that training needs is not installed.
@@ -108,7 +120,8 @@ def time_to_gait(config: TimeToGait) -> Generator[Outcome]:
     for seed in range(config.seeds):
         for gait in config.gaits:
             for entry in entries:
-                yield _train(entry, gaits.load(gait), seed, config.check)
+                told = (outcome for outcome in known if entry.knows(outcome, gait, seed))
+                yield next(told, None) or _train(entry, gaits.load(gait), seed, config.check)
 
 
 def _entries(config: TimeToGait) -> list[_Entry]:
@@ -154,7 +167,7 @@ def _train(entry: _Entry, machine: RewardMachine, seed: int, check: Check) -> Ou
             loaded = policy.load(learner.export())
             figures = check.see(loaded)
             reached = check.is_passed(figures, loaded.info.forward_speed)
-            if reached or learner.steps >= entry.most_steps or seconds >= entry.most_seconds:
+            if reached or entry.gives_up(learner.steps, seconds):
                 return Outcome(
                     gait=machine.name,
                     learner=entry.name,

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from gaitshift import policy
-from gaitshift.benchmark.outcome import Outcome, ratio_text, summary, write_csv
+from gaitshift.benchmark.outcome import COLUMNS, Outcome, ratio_text, row_of, summary
 from gaitshift.benchmark.speed import SpeedConfig, environment_speed, training_speed
-from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
+from gaitshift.cli.growing import kept_rows
+from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.table import write_rows
 
 if TYPE_CHECKING:
     from gaitshift.benchmark.time_to_gait import TimeToGait
@@ -29,9 +31,10 @@ class TimeToGaitOptions:
     quick: bool = False
     """Seconds of trot on few robots: shows that all of it works, not how fast it is."""
     out: Path | None = None
-    """Folder for time_to_gait.csv and time_to_gait.png."""
+    """Folder for time_to_gait.csv and time_to_gait.png; trainings that the table has already are
+    kept, so that a command that was broken off goes on."""
     overwrite: bool = False
-    """Replace these files in a folder that is not empty."""
+    """Begin anew where there are results already."""
 
     def config(self) -> "TimeToGait":
         """The measurement asked for."""
@@ -142,16 +145,18 @@ class Bench:
 
         options = self.time_to_gait
         config, out = options.config(), options.out
+        known: list[Outcome] = []
         if out is not None:
-            check_folder(out, overwrite=options.overwrite, ours=(TABLE, PICTURE))
+            kept = kept_rows(out / TABLE, COLUMNS, "trainings", overwrite=options.overwrite)
+            known = [Outcome(**row) for row in kept]
         outcomes: list[Outcome] = []
         with progress("training") as report:
-            for outcome in time_to_gait(config):
+            for outcome in time_to_gait(config, known):
                 outcomes.append(outcome)
                 report(len(outcomes), config.trainings)
                 say(f"{outcome.gait}, seed {outcome.seed}, {outcome.learner}: {_text(outcome)}")
                 if out is not None:
-                    _write(outcomes, out)
+                    _write([*outcomes, *(one for one in known if not _told(one, outcomes))], out)
         found = summary(outcomes)
         if self.json:
             emit_json({"check": asdict(config.check), "gaits": found})
@@ -162,9 +167,16 @@ class Bench:
 def _write(outcomes: list[Outcome], out: Path) -> None:
     from gaitshift.plots import time_to_gait_figure  # matplotlib is slow to import
 
-    out.mkdir(parents=True, exist_ok=True)
-    write_csv(outcomes, out / TABLE)
+    write_rows(out / TABLE, COLUMNS, [row_of(outcome) for outcome in outcomes])
     time_to_gait_figure(outcomes, out / PICTURE)
+
+
+def _told(known: Outcome, outcomes: list[Outcome]) -> bool:
+    """Whether there is an outcome of the same training by now."""
+    return any(
+        (known.gait, known.learner, known.seed) == (one.gait, one.learner, one.seed)
+        for one in outcomes
+    )
 
 
 def _text(outcome: Outcome) -> str:

@@ -1,11 +1,10 @@
 """Results that grow row by row: what the commands that make them share."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from gaitshift.cli.output import check_folder
 from gaitshift.errors import GaitshiftError
+from gaitshift.table import Columns, Row, read_rows
 
 README = "README.md"
 
@@ -18,12 +17,8 @@ def check_numbers(what: str, count: int, seed: int, *, least: int = 1) -> None:
         raise GaitshiftError(f"seed {seed}: a seed is 0 or larger")
 
 
-def kept_rows(
-    path: Path, columns: Mapping[str, type], what: str, *, overwrite: bool
-) -> list[dict[str, Any]]:
+def kept_rows(path: Path, columns: Columns, what: str, *, overwrite: bool) -> list[Row]:
     """The rows that an earlier call left in a folder, which is there from now on."""
-    from gaitshift.studies.table import read_rows
-
     if not path.is_file():
         check_folder(path.parent, overwrite=overwrite, ours=(path.name, README))
     rows = [] if overwrite else read_rows(path, columns, what)

@@ -11,6 +11,7 @@ from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.switching import CONDITIONS
+from gaitshift.table import write_rows
 
 TABLE = "crossings.csv"
 
@@ -48,7 +49,6 @@ class Study:
         try:
             from gaitshift.studies.crossing import cross, ways
             from gaitshift.studies.crossing_table import COLUMNS, PICTURE, is_of, page, row_of
-            from gaitshift.studies.table import write_rows
         except ImportError as error:
             raise GaitshiftError(
                 f"study needs the package '{error.name}'; install gaitshift[identify]"

@@ -13,6 +13,7 @@ from gaitshift import policy as policies
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.table import write_rows
 
 TABLE, PAGE = "transitions.csv", "page.html"
 
@@ -46,7 +47,6 @@ class Transitions:
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.studies import Pair, run_pair
-            from gaitshift.studies.table import write_rows
             from gaitshift.studies.transition_page import page
             from gaitshift.studies.transition_table import COLUMNS, is_of, row_of
         except ImportError as error:

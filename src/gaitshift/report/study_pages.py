@@ -21,8 +21,8 @@ from gaitshift.plots.palette import gait_colours
 from gaitshift.report.data import title_of
 from gaitshift.report.figures import Axis, Curve, Kind, Said, curves, heat_map
 from gaitshift.report.page import facts_table, figure, table, write_page
-from gaitshift.studies.table import Row
 from gaitshift.studies.transition_page import HEAD, row_cells
+from gaitshift.table import Row
 
 _FALSE = Kind(name="shifts where it should not", colour="#f3d9c4")
 _MISSED = Kind(name="no shift at all, or most missed", colour="pale")

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from gaitshift.identification import wilson
 from gaitshift.studies.crossing import AFTER, BEFORE, NOISE, PATIENCE, Crossings, Way
-from gaitshift.studies.table import Row
+from gaitshift.table import Row
 
 COLUMNS: dict[str, type] = {
     "amplitude": float,

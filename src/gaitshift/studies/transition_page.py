@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from gaitshift.studies.table import Row
+from gaitshift.table import Row
 
 _INTRODUCTION = """# Shifts in an instant
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from gaitshift.identification import wilson
-from gaitshift.studies.table import Row
 from gaitshift.studies.transitions import Outcomes, Pair
+from gaitshift.table import Row
 
 PHASES = 10
 """Parts that the stride is cut into."""

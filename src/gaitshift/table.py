@@ -1,19 +1,21 @@
 """Tables that grow row by row, and are kept as they grow."""
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from gaitshift.errors import GaitshiftError
 
 Row = dict[str, Any]
+Columns = Mapping[str, Callable[[str], Any]]
+"""Names of columns, and what makes a value of a cell's text: `float`, `int`, `str`, …"""
 
 
-def read_rows(path: Path, columns: Mapping[str, type], what: str) -> list[Row]:
+def read_rows(path: Path, columns: Columns, what: str) -> list[Row]:
     """The rows of an earlier, perhaps unfinished, table of `what`; none where there is no file.
 
-    `columns` gives the type of each; an empty cell stays an empty text.
+    An empty cell stays an empty text.
 
     Raises:
         GaitshiftError: it is no such table.
@@ -33,7 +35,7 @@ def read_rows(path: Path, columns: Mapping[str, type], what: str) -> list[Row]:
         raise GaitshiftError(f"{path}: {error}") from error
 
 
-def write_rows(path: Path, columns: Mapping[str, type], rows: Sequence[Row]) -> None:
+def write_rows(path: Path, columns: Columns, rows: Sequence[Row]) -> None:
     """Writes the table, whole or not at all."""
     part = path.with_suffix(".part")
     with part.open("w", newline="") as file:
