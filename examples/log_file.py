@@ -28,7 +28,8 @@ def write_example(path: Path) -> None:
         stride = np.cumsum(np.diff(phase, prepend=1.0) < 0.0)
         ground = 0.08 * rng.random(stride[-1] + 1)[stride] * rough
         columns[f"contact_{name}"] = (phase < 0.5).astype(int)
-        columns[f"foot_{name}_x"] = (0.35 if leg < 2 else -0.35) + 0.0 * time
+        sweep = 0.3 * np.abs(2.0 * phase - 1.0) - 0.15  # back while it stands, forth in the air
+        columns[f"foot_{name}_x"] = (0.35 if leg < 2 else -0.35) + sweep
         columns[f"foot_{name}_y"] = (0.2 if leg % 2 == 0 else -0.2) + 0.0 * time
         columns[f"foot_{name}_z"] = -0.5 + np.where(phase < 0.5, ground, 0.1)
     with path.open("w", newline="") as file:

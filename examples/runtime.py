@@ -49,7 +49,7 @@ def motion_of(sensors: dict[str, np.ndarray]) -> Motion:
 
 def main(steps: int) -> float:
     """Runs the loop; gives the median time of a step [ms]."""
-    graph = GaitGraph.load("terrain")  # trot on flat ground, bound on rough, by the foot heights
+    graph = GaitGraph.load("terrain")  # trot on level ground, bound on rough
     driver = Driver({gait: policy.load(gait) for gait in graph.gaits}, 1, start=graph.start)
     higher_controller = Autonomous(graph, 1)
     command = driver.own_command()

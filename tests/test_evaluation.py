@@ -62,7 +62,7 @@ def test_robots_run_alone_as_they_run_in_a_batch(trot: policy.Policy) -> None:
 
 
 def _standing(folder: Path, name: str, dwell: int, speed: float) -> policy.Policy:
-    """A policy that stands still whatever it sees, of a gait at home at 100 / (2 dwell) Hz."""
+    """A policy that stands still whatever it sees, of a gait with a nominal 100 / (2 dwell) Hz."""
     tables = gaits.load("trot").to_dict() | {"name": name, "dwell": dwell, "speed": speed}
     tables |= {"dwell_range": [10, 40], "speed_range": [0.1, 2.0]}
     tables["transition"] = [way | {"dwell": dwell} for way in tables["transition"]]

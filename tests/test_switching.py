@@ -373,7 +373,7 @@ def with_dwell(machine, dwell, name):
 
 @pytest.fixture(scope="module")
 def paced(tmp_path_factory):
-    """Policies at home at different commands: 1.1 m/s and 100 / (2 · 20) Hz, 0.6 and 2 · 25."""
+    """Policies of different nominal commands: 1.1 m/s and 100 / (2 · 20) Hz, 0.6 and 2 · 25."""
     folder = tmp_path_factory.mktemp("paced")
     return {
         "quick": exported(folder, with_dwell(gaits.load("trot"), 20, "quick"), speed=1.1),

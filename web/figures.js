@@ -166,11 +166,12 @@ function legend(entries) {
 /** Curves over the unit square, each in its colour; the pointer reads all of them at its place. */
 function curves(holder, data) {
   const high = () => 400;
-  // A curve of steps: its value at x is that of the last point at or before x.
+  // Straight between points; where the curve rises upright, the upper end.
   const valueAt = (one, x) => {
-    let value = one.y[0];
-    for (let i = 0; i < one.x.length && one.x[i] <= x + 1e-9; i++) value = one.y[i];
-    return value;
+    let i = 0;
+    while (i + 1 < one.x.length && one.x[i + 1] <= x + 1e-9) i++;
+    if (i + 1 === one.x.length) return one.y[i];
+    return one.y[i] + ((one.y[i + 1] - one.y[i]) * (x - one.x[i])) / (one.x[i + 1] - one.x[i]);
   };
 
   function paint(pen, { x, y, view, at, box }) {
@@ -185,7 +186,7 @@ function curves(holder, data) {
       pen.beginPath();
       pen.strokeStyle = shade(one.colour);
       pen.lineWidth = 2;
-      one.x.forEach((v, i) => (i && pen.lineTo(x(v), y(one.y[i - 1])), pen.lineTo(x(v), y(one.y[i]))));
+      one.x.forEach((v, i) => pen.lineTo(x(v), y(one.y[i])));
       pen.stroke();
     }
     if (at) (pen.fillStyle = style("--quiet")), pen.fillRect(x(at[0]), box.y, 1, box.h);

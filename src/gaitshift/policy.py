@@ -48,11 +48,11 @@ class PolicyInfo:
     control_rate: float
     """Control steps a second [Hz]."""
     forward_speed: float
-    """The forward speed it is at home at [m/s]."""
+    """Nominal forward speed [m/s]."""
     speed_range: list[float]
     """Least and greatest forward speed that it was trained for [m/s]."""
     stride_frequency: float
-    """The stride frequency it is at home at [Hz]."""
+    """Nominal stride frequency [Hz]."""
     stride_frequency_range: list[float]
     """Least and greatest stride frequency that it was trained for [Hz]."""
     training: dict[str, Any]

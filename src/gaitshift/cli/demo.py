@@ -61,7 +61,7 @@ class Demo(DemoConfig):
     overwrite: bool = False
     """Replace these files in a folder that is not empty."""
     video: bool = True
-    """Render the video; it takes most of the time."""
+    """Whether to render the video, which takes most of the time."""
     json: bool = False
     """One JSON object on stdout: the summary."""
 

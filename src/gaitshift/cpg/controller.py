@@ -116,7 +116,7 @@ class CpgController:
         """Oscillators expect nothing."""
 
     def own_command(self) -> Command:
-        """Straight ahead, each robot at the speed and frequency that its gait is at home at."""
+        """Straight ahead, at the nominal speed and frequency of each robot's gait."""
         speed = np.array([gait.speed for gait in self._of])
         frequency = np.array([gait.frequency for gait in self._of])
         return Command(

@@ -14,7 +14,7 @@ class CpgGait:
     duty: float
     """Share of a stride that each foot is down."""
     speed: float
-    """Forward speed that it is at home at [m/s]."""
+    """Nominal forward speed [m/s]."""
     clearance: float = 0.07
     """Height of the swing [m]."""
     stance_x: float = 0.34

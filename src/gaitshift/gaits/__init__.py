@@ -11,7 +11,7 @@ is checked when it is read, never run. It holds
   stride frequency; transitions that name their own keep their proportion. `dwell` alone if left
   out;
 - `speed` [m/s, the paper's 1.2 if left out] and `speed_range` [m/s, `speed` alone if left out]:
-  where the gait is at home, and what may be commanded;
+  the nominal ones, and what may be commanded;
 - `ideal_phase`: touchdown of each foot [fraction of the stride, 0 to below 1];
 - `[[state]]`, the first one initial: `name`, and `stance`, the feet down; or `name` and
   `accepting = true` for a state in which the run ends;

@@ -91,7 +91,7 @@ CANDIDATES = (
         low=0.005,
         high=0.5,
         leaks=_six(_LEAKS),
-        note="the same along the vertical, with a leak",
+        note="differences of foot heights along the vertical; a leak may be chosen",
     ),
     _watching(
         PlaneResidual(),

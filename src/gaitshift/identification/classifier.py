@@ -1,4 +1,4 @@
-"""An upper mark: gradient boosting on windows of the same signals that conditions are fed with."""
+"""An upper bound: gradient boosting on windows of the same signals that conditions are fed with."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -113,7 +113,7 @@ class RoughnessClassifier:
             name=NAME,
             low=0.02,
             high=0.999,
-            note="gradient boosting on all of these signals: an upper mark",
+            note="gradient boosting on all of these signals: an upper bound",
             values=lambda recording: self.probability(recording, crosswise=crosswise),
         )
 

@@ -60,7 +60,7 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
     """Heading of a report, and how its numbers were chosen and judged."""
     tuned = judged[0].tuned
     who = (
-        "Other logs judged them than chose them."
+        "They were chosen on some logs and judged on others."
         if held_out
         else "The same logs chose and judged them, so the figures flatter."
     )
@@ -195,7 +195,7 @@ def condition_cells(row: Row) -> tuple[str, ...]:
 
 COURSES_HEAD = (
     *("course", "noticed", "delay [m]", "95 % within [m]", "delay [s]"),
-    *("false shifts", "per km", "area"),
+    *("false shifts", "a km, 95 %", "area"),
 )
 """Above the cells of `course_cells`."""
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.identification.finding import Judged, Tuned
@@ -26,6 +26,12 @@ LINES = (
 
 LATEST = 6.0
 """Delays are shaded up to here [m]."""
+_FALSE = "#f3d9c4"
+
+
+NOTICED = "share of the passages to be noticed with a shift"
+OTHERS = "share of other passages with a shift"
+"""Axes of a ROC curve."""
 
 
 def condition_map(tuned: Tuned, path: Path) -> Figure:
@@ -41,32 +47,43 @@ def condition_map(tuned: Tuned, path: Path) -> Figure:
         axes.grid(visible=False)
         axes.set_facecolor(PALE)
         shades = LinearSegmentedColormap.from_list("delay", ["#0b3c5d", "#4f97c4", "#dcebf5"])
-        betas = grid.betas[1:]  # a logarithmic scale has no 0
         mesh = axes.pcolormesh(
-            betas, grid.alphas, delay[:, 1:], cmap=shades, vmin=0.0, vmax=LATEST, shading="nearest"
+            grid.betas, grid.alphas, delay, cmap=shades, vmin=0.0, vmax=LATEST, shading="nearest"
         )
-        alarmed = np.where(~quiet, 1.0, np.nan)[:, 1:]
-        false = LinearSegmentedColormap.from_list("false", ["#f3d9c4", "#f3d9c4"])
-        axes.pcolormesh(betas, grid.alphas, alarmed, cmap=false, shading="nearest")
+        alarmed = np.where(~quiet, 1.0, np.nan)
+        false = LinearSegmentedColormap.from_list("false", [_FALSE, _FALSE])
+        axes.pcolormesh(grid.betas, grid.alphas, alarmed, cmap=false, shading="nearest")
         choice = tuned.choice
-        axes.plot(
-            max(choice.beta, 1.0), choice.alpha, "o", color=PAPER, markersize=9, mec=INK, mew=2
-        )
-        axes.set_xscale("log")
+        axes.plot(choice.beta, choice.alpha, "o", color=PAPER, markersize=9, mec=INK, mew=2)
+        axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)  # β may be 0
         axes.set_yscale("log")
         axes.set_xlabel("β [counts]")
         unit = tuned.candidate.unit
         axes.set_ylabel(f"α [{unit}]" if unit else "α")
         for axis in (axes.xaxis, axes.yaxis):
             axis.set_major_formatter(FuncFormatter(_plain))
-        _name(axes, 0.98, 0.05, "no shift at all, or most missed", QUIET, "right")
-        _name(axes, 0.02, 0.05, "shifts where it should not", "#9a4a00", "left")
-        bar = cast(Any, figure.colorbar(mesh, ax=axes, pad=0.02))
-        bar.set_label("mean way until it is noticed [m]")
+            axis.set_minor_formatter(NullFormatter())
+        regions = (
+            (bool((~quiet).any()), _FALSE, "shifts where it should not"),
+            (bool((quiet & ~mostly).any()), PALE, "no shift at all, or most missed"),
+        )
+        axes.legend(
+            handles=[Patch(color=colour, label=name) for there, colour, name in regions if there],
+            loc="upper left",
+            bbox_to_anchor=(0.0, -0.14),
+            ncols=2,
+            frameon=False,
+            fontsize=12,
+        )
+        ends = "max" if (delay > LATEST).any() else "neither"
+        bar = cast(
+            Any, figure.colorbar(mesh, ax=axes, pad=0.02, extend="max" if late else "neither")
+        )
+        bar.set_label("mean distance until it is noticed [m]")
         bar.outline.set_visible(False)
         seconds = choice.beta * CONTROL_PERIOD
         axes.set_title(
-            f"{tuned.candidate.name}: α = {choice.alpha:.3g} {unit}".rstrip()
+            f"{tuned.candidate.name}\nα = {choice.alpha:.3g} {unit}".rstrip()
             + f", β = {choice.beta:g} ({seconds:.2g} s at a count a step), leak {choice.leak:g}",
             loc="left",
             fontsize=12,
@@ -88,7 +105,7 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
             area = one.area(course)
             x, y = roc(one.scores_on(course), one.other_scores)
             colour = LINES[index % len(LINES)] if index < len(LINES) else GROUND
-            axes.plot(x, y, color=colour, drawstyle="steps-post")
+            axes.plot(x, y, color=colour)
             rows.append((area[0] if area else 0.0, one.tuned.candidate.name, colour))
         for line, (area, name, colour) in enumerate(sorted(rows, reverse=True)):
             axes.text(
@@ -103,8 +120,8 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
         axes.text(1.03, 1.06, "area", color=QUIET, transform=axes.transAxes, va="top", fontsize=12)
         axes.set_xlim(-0.01, 1.0)
         axes.set_ylim(0.0, 1.01)
-        axes.set_xlabel("share of other passages with a shift")
-        axes.set_ylabel("share of rough passages with a shift")
+        axes.set_xlabel(OTHERS)
+        axes.set_ylabel(NOTICED)
         axes.set_title(f"passages of 3 m, {course} against the rest", loc="left", fontsize=12)
         figure.tight_layout()
         figure.subplots_adjust(right=0.66)
@@ -113,7 +130,10 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
 
 
 def roc(wanted: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the others, and of the wanted, with a shift at each α, the strictest first."""
+    """Shares of the others, and of the wanted, with a shift at each α, the strictest first.
+
+    Passages of one score come in together, as a slope, so that the area below counts ties by half.
+    """
     levels = np.unique(np.concatenate([wanted, others]))[::-1]
     x = np.array([0.0, *[(others >= level).mean() for level in levels]])
     y = np.array([0.0, *[(wanted >= level).mean() for level in levels]])
@@ -122,16 +142,3 @@ def roc(wanted: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 def _plain(value: float, position: float | None) -> str:
     return f"{value:g}"
-
-
-def _name(axes: Axes, x: float, y: float, words: str, colour: str, side: str) -> None:
-    axes.text(
-        x,
-        y if side == "left" else 1.0 - y,
-        words,
-        color=colour,
-        transform=axes.transAxes,
-        ha=side,
-        va="bottom" if side == "left" else "top",
-        fontsize=12,
-    )

@@ -16,7 +16,7 @@ from gaitshift.identification.report import (
     course_cells,
     course_rows,
 )
-from gaitshift.plots.identification import LATEST, LINES, roc
+from gaitshift.plots.identification import LATEST, LINES, NOTICED, OTHERS, roc
 from gaitshift.plots.palette import gait_colours
 from gaitshift.report.data import title_of
 from gaitshift.report.figures import Axis, Curve, Kind, Said, curves, heat_map
@@ -115,7 +115,7 @@ def _condition_map(one: Judged) -> dict[str, Any]:
         x=Axis.of_numbers("β [counts]", "β", grid.betas),
         y=Axis.of_numbers(f"α [{unit}]" if unit else "α", "α", grid.alphas, unit),
         shade=tally.delay_m,
-        scale=f"mean way until it is noticed, 0 to {LATEST:g} m",
+        scale=f"mean distance until it is noticed, 0 to {LATEST:g} m",
         span=(0.0, LATEST),
         stops=("#0b3c5d", "#4f97c4", "#dcebf5"),
         kind=kind,
@@ -147,8 +147,8 @@ def _roc(judged: Sequence[Judged], course: str) -> dict[str, Any]:
     series.sort(key=lambda pair: -pair[0])
     return curves(
         title=f"ROC curves on {course}",
-        x="share of other passages with a shift",
-        y="share of rough passages with a shift",
+        x=OTHERS,
+        y=NOTICED,
         series=[curve for _, curve in series],
     )
 

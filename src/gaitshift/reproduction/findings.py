@@ -191,8 +191,8 @@ _COMPARISONS = {
         _speeds_up,
     ),
     "penalties": (
-        "No factor λ that grows is needed on the penalties: in full from the start, they are "
-        "learned with much quicker (III-D).",
+        "The penalties need no growing factor λ: with full penalties from the start, learning is "
+        "much faster (III-D).",
         "curriculum",
         _is_spared,
     ),
@@ -203,11 +203,11 @@ that setting."""
 
 
 def _told(label: str, seeds: Seeds) -> str:
-    """How many walk, how many are as fast in whatever gait, and from when, by the median."""
+    """How many walk, how many are as fast in any gait, and from when, by the median."""
     text = (
-        f"**{label}** {seeds.walking} of {len(seeds)} walk (median from iteration "
-        f"{_iteration(seeds.walk_from)}), {seeds.moving} are as fast in whatever gait "
-        f"({_iteration(seeds.move_from)}); at the end {_number(seeds.late('speed'), '.2f')} m/s, "
+        f"**{label}** {seeds.walking} of {len(seeds)} walk "
+        f"({_median(seeds.walk_from)}), {seeds.moving} are as fast in any gait "
+        f"({_median(seeds.move_from)}); at the end {_number(seeds.late('speed'), '.2f')} m/s, "
         f"{_number(seeds.late('changes_per_s'), '.1f')} changes a second"
     )
     broken = sum(seeds.broken)
@@ -226,6 +226,10 @@ def _or_never(iteration: float | None) -> float:
 
 def _iteration(iteration: float | None) -> str:
     return "never" if iteration is None else f"{iteration:g}"
+
+
+def _median(iteration: float | None) -> str:
+    return "the median never" if iteration is None else f"median iteration {iteration:g}"
 
 
 def _number(value: float | None, form: str) -> str:

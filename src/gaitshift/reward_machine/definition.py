@@ -1,4 +1,4 @@
-"""What a gait file says of a gait: states, edges, and where the gait is at home."""
+"""What a gait file says of a gait: states, edges, and its nominal commands."""
 
 import re
 from dataclasses import dataclass, replace
@@ -71,7 +71,7 @@ class Definition:
     """Least and greatest dwell that may be commanded [control steps]: the gait's frequencies."""
 
     speed: float
-    """Forward speed at which the gait is at home [m/s]."""
+    """Nominal forward speed [m/s]."""
 
     speed_range: tuple[float, float]
     """Least and greatest forward speed that may be commanded [m/s]."""

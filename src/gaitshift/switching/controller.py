@@ -52,7 +52,7 @@ class Controller(Protocol):
         ...
 
     def own_command(self) -> Command:
-        """Straight ahead, at the speed and stride frequency each robot's gait is at home at."""
+        """Straight ahead, at the nominal speed and stride frequency of each robot's gait."""
         ...
 
     def stance_shown(self, motion: Motion) -> Bool[np.ndarray, " N"]:

@@ -131,7 +131,7 @@ class Driver:
         return value
 
     def own_command(self) -> Command:
-        """Straight ahead, each robot at the speed and stride frequency its gait is at home at."""
+        """Straight ahead, at the nominal speed and stride frequency of each robot's gait."""
         speed = np.array([policy.info.forward_speed for policy in self.policies.values()])
         frequency = np.array([policy.info.stride_frequency for policy in self.policies.values()])
         return Command(
