@@ -61,7 +61,7 @@ def main(steps: int) -> float:
         target = driver.act(motion, command)  # joint targets [rad], for your joint controllers
         motion = motion_of(sensors)
         driver.see(motion, command)
-        decision = higher_controller.step(0.01 * step, motion, driver)
+        decision = higher_controller.step(0.01 * step, motion, driver, command)
         command = driver.own_command()  # of the gait that is in force now
         took[step] = time.perf_counter() - start
         if step % 100 == 0:

@@ -523,6 +523,29 @@ def test_no_shift_comes_before_a_gait_has_been_held():
     assert at == [50, 100, 150, 200]
 
 
+@pytest.mark.parametrize(
+    ("kind", "name", "value"),
+    [
+        ("attitude_variance", "window", 0),
+        ("slip", "window", -1.0),
+        ("cost_of_transport", "mass", 0.0),
+        ("cost_of_transport", "least_speed", 0.0),
+        ("value_drop", "fast", 0.0),
+        ("value_drop", "slow", "inf"),
+        ("plane_residual", "least_swing", -0.1),
+        ("touchdown_surprise", "least_swing", "nan"),
+    ],
+)
+def test_a_setting_that_no_statistic_can_have_is_named_with_its_place(tmp_path, kind, name, value):
+    path = tmp_path / "ways.toml"
+    path.write_text(
+        f'start = "trot"\n[statistic.s]\nkind = "{kind}"\n{name} = {value}\n'
+        '[[edge]]\nfrom = "trot"\nto = "bound"\nstatistic = "s"\nalpha = 1\nbeta = 1\n'
+    )
+    with pytest.raises(GaitshiftError, match=rf"ways.toml.*statistic s.*{name} = "):
+        GaitGraph.load(path)
+
+
 def test_without_reset_k_goes_on_from_where_it_fired():
     condition = Condition(alpha=0.05, beta=3.0, reset=False)
     state, seen = condition.start(1), []

@@ -1,6 +1,7 @@
 """Rollouts and evaluations, with policies that stand still and with the shipped ones."""
 
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -78,7 +79,7 @@ def _standing(folder: Path, name: str, dwell: int, speed: float) -> policy.Polic
 
 @pytest.fixture(scope="module")
 def standing(tmp_path_factory) -> dict[str, policy.Policy]:
-    """At home at 0.9 m/s and 2.5 Hz, at 0.4 m/s and 2 Hz."""
+    """Nominally 0.9 m/s and 2.5 Hz, 0.4 m/s and 2 Hz."""
     folder = tmp_path_factory.mktemp("standing")
     return {
         "quick": _standing(folder, "quick", dwell=20, speed=0.9),
@@ -99,7 +100,7 @@ def _commanded(standing: dict[str, policy.Policy], **config: float) -> np.ndarra
     ).command
 
 
-def test_robots_are_asked_for_what_their_present_gait_is_at_home_at(standing) -> None:
+def test_robots_are_asked_for_what_is_nominal_of_their_present_gait(standing) -> None:
     """The shift follows the tenth step, and the eleventh is the first under the new command."""
     command = _commanded(standing)
     assert command.shape == (20, 2, 3)
@@ -107,6 +108,37 @@ def test_robots_are_asked_for_what_their_present_gait_is_at_home_at(standing) ->
     np.testing.assert_allclose(command[10:, :, 0], 0.4)
     np.testing.assert_allclose(command[:10, :, 2], 2.5)
     np.testing.assert_allclose(command[10:, :, 2], 2.0)
+
+
+def test_switchers_are_told_the_wanted_speed_and_not_the_trimmed_one(standing) -> None:
+    """Else a condition on speed counts other values than a replay of the log does."""
+
+    class Listener(Scheduled):
+        heard: ClassVar[list[np.ndarray]] = []
+
+        def step(self, time, motion, driver, command):
+            self.heard.append(command.forward_speed)
+            return super().step(time, motion, driver, command)
+
+    driver, asked = Driver(standing, 2, start="quick"), []
+    act = driver.act
+
+    def acting(motion, command):
+        asked.append(command.forward_speed)
+        return act(motion, command)
+
+    driver.act = acting
+    log = rollout(
+        World(standing["quick"].robot, flat(9.0, 9.0), 2, threads=1),
+        driver,
+        RolloutConfig(seconds=0.5, speed=0.2),
+        start_xy=np.zeros((2, 2)),
+        rng=np.random.default_rng(0),
+        switcher=Listener(()),
+    )
+    assert np.max(asked) > 0.25, "who stands is asked for more"
+    np.testing.assert_array_equal(np.array(Listener.heard), 0.2)
+    np.testing.assert_array_equal(log.command[..., 0], np.array(Listener.heard))
 
 
 def test_a_speed_or_frequency_that_is_given_holds_for_every_gait(standing) -> None:

@@ -22,6 +22,7 @@ from gaitshift.switching import (
     GaitGraph,
     Rule,
     Scheduled,
+    Signals,
     Switcher,
 )
 from gaitshift.terrain import flat
@@ -254,7 +255,7 @@ def test_a_condition_that_looks_at_the_critics_value_is_shown_it(tmp_path):
     for step, motion in enumerate(staggering(1, 7)):
         driver.act(motion, Command.straight(1))
         driver.see(motion, Command.straight(1))
-        switcher.step(step / 100, motion, driver)
+        switcher.step(step / 100, motion, driver, driver.own_command())
         seen.append(gaits_of(driver)[0])
     assert seen == ["trot", "trot", "bound", "bound", "trot", "trot", "trot"]
 
@@ -476,7 +477,7 @@ def walk_the_timeline(policies):
     for step, row in enumerate(TIMELINE):
         motion = motion_of(["FL FR BL BR"] * 2, np.array([row[0], row[4]]))
         driver.see(motion, driver.own_command())
-        decision = switcher.step((step + 1) / 100, motion, driver)
+        decision = switcher.step((step + 1) / 100, motion, driver, driver.own_command())
         yield row, driver, decision
 
 
@@ -517,7 +518,7 @@ def test_each_entry_of_a_schedule_is_carried_out_once_when_it_is_due(policies):
     motion = motion_of(["FL BR", "FR BL"])
     seen = []
     for step in range(8):
-        switcher.step((step + 1) / 100, motion, driver)
+        switcher.step((step + 1) / 100, motion, driver, driver.own_command())
         seen.append(gaits_of(driver))
         if step == 2:  # whoever changes a gait by hand is not overruled before the next entry
             driver.switch(np.array([1]), "trot", motion)
@@ -530,13 +531,15 @@ def test_each_entry_of_a_schedule_is_carried_out_once_when_it_is_due(policies):
 def test_entries_that_fall_due_together_are_carried_out_in_order(policies):
     driver = Driver(policies, 1, start="trot")
     switcher = Scheduled(((3.0, "bound"), (3.0, "pace")))
-    switcher.step(3.0, motion_of(["FL BL"]), driver)
+    switcher.step(3.0, motion_of(["FL BL"]), driver, driver.own_command())
     assert gaits_of(driver) == ["pace"]
 
 
 def test_a_schedule_has_no_counter_to_tell(policies):
     driver = Driver(policies, 3, start="trot")
-    decision = Scheduled(((0.01, "pace"),)).step(0.01, motion_of(["FL"] * 3), driver)
+    decision = Scheduled(((0.01, "pace"),)).step(
+        0.01, motion_of(["FL"] * 3), driver, driver.own_command()
+    )
     assert not decision.k.any()
     assert not decision.threshold.any()
     assert decision.foot_height.shape == (3, 4)
@@ -545,6 +548,24 @@ def test_a_schedule_has_no_counter_to_tell(policies):
 def test_both_switchers_are_switchers():
     assert isinstance(Autonomous(GaitGraph.of(CONDITION, flat="trot", rough="pace"), 1), Switcher)
     assert isinstance(Scheduled(()), Switcher)
+
+
+@pytest.mark.parametrize("reset", [True, False])
+def test_a_graph_of_a_condition_counts_as_the_condition_does(policies, reset):
+    condition = replace(CONDITION, reset=reset)
+    driver = Driver(policies, 2, start="trot")
+    switcher = Autonomous(GaitGraph.of(condition, flat="trot", rough="bound"), 2)
+    rng, state = np.random.default_rng(3), condition.start(2)
+    shifted, shifts = np.array([False, False]), 0
+    for step in range(200):
+        feet = np.where(rng.random((2, 1)) < 0.5, ONE_UP, LEVEL)
+        motion = motion_of(["FL FR BL BR"] * 2, feet)
+        decision = switcher.step((step + 1) / 100, motion, driver, driver.own_command())
+        state, fire = condition.step(state, Signals.from_motion(motion), shifted)
+        np.testing.assert_array_equal(decision.k, state.counted)
+        shifted, shifts = shifted ^ fire, shifts + fire.sum()
+        assert gaits_of(driver) == ["bound" if one else "trot" for one in shifted]
+    assert shifts > 20
 
 
 def test_only_numbers_of_a_graph_can_be_retuned(policies):
@@ -563,5 +584,7 @@ def test_only_numbers_of_a_graph_can_be_retuned(policies):
 def test_a_condition_of_other_numbers_is_another_condition(policies):
     driver = Driver(policies, 1, start="trot")
     switcher = Autonomous(GaitGraph.of(replace(CONDITION, beta=2.0), flat="trot", rough="bound"), 1)
-    switcher.step(0.01, motion_of(["FL FR BL BR"], np.array([ONE_UP])), driver)
+    switcher.step(
+        0.01, motion_of(["FL FR BL BR"], np.array([ONE_UP])), driver, driver.own_command()
+    )
     assert gaits_of(driver) == ["bound"], "3 > 2 at the first step"

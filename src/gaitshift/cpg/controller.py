@@ -59,8 +59,6 @@ class CpgController:
         self.network = HopfNetwork() if network is None else network
         self.gaits = tuple(gaits)
         self.n = n
-        self.command: Command | None = None
-        """The command that robots acted on in the step seen last."""
         self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         """For logs; oscillators have no machine."""
         self._of = [GAITS[name] for name in self.gaits]
@@ -90,7 +88,6 @@ class CpgController:
 
     def see(self, motion: Motion, command: Command) -> None:
         """Takes in the motion that came of `command`."""
-        self.command = command
         share = CONTROL_PERIOD / self.config.smoothing
         seen = motion.base_linear_velocity_b[:, :2]
         self._velocity = self._velocity + share * (seen - self._velocity)

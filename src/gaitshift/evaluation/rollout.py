@@ -96,7 +96,7 @@ class Walk:
         self.fallen = self.fallen | motion.body_contact
         driver.see(motion, self._asked)
         if self.switcher is not None:
-            self.decision = self.switcher.step(self.time, motion, driver)
+            self.decision = self.switcher.step(self.time, motion, driver, self.wanted)
         see()
         self.wanted = self._command()
         forward = motion.base_linear_velocity_b[:, 0]

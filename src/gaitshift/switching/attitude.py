@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.switching.signals import Signals
+from gaitshift.switching.statistic import check_positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +22,9 @@ class AttitudeVariance:
     unit = "rad"
     width = 1
     needs = ()
+
+    def __post_init__(self) -> None:
+        check_positive(self, "window")
 
     def start(self, n: int) -> Float[np.ndarray, "N 5"]:
         """Sum of weights, means of roll and pitch, and of their squared distances from them."""

@@ -22,8 +22,6 @@ class Controller(Protocol):
     """Index into `gaits` of the gait that each robot is in."""
     machine_state: Int[np.ndarray, " N"]
     """State of that gait's machine, for logs; 0 where there is none."""
-    command: Command | None
-    """The command that robots acted on in the step seen last."""
 
     @property
     def robot(self) -> Robot:

@@ -42,8 +42,6 @@ class Driver:
         self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
         self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []
-        self.command: Command | None = None
-        """The command that robots acted on in the step seen last."""
         self.machine_state[:] = self._machines[self.gaits.index(start)].initial
 
     @property
@@ -61,7 +59,6 @@ class Driver:
 
         `command` is the one that the robots acted on.
         """
-        self.command = command
         self._touch_height = last_touch(motion, self._touch_height)
         stride = command.stride
         for index, ids in self._groups():

@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from gaitshift.motion import GRAVITY
 from gaitshift.switching.signals import Signals
+from gaitshift.switching.statistic import check_positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +24,9 @@ class CostOfTransport:
     unit = ""
     width = 1
     needs = ("power", "velocity_b")
+
+    def __post_init__(self) -> None:
+        check_positive(self, "window", "mass", "least_speed")
 
     def start(self, n: int) -> Float[np.ndarray, "N 3"]:
         """Sum of weights, mean power [W] and mean forward speed [m/s], nothing seen yet."""

@@ -25,7 +25,7 @@ class Signals:
     gravity_b: Float[np.ndarray, "N 3"]
     """Unit vector along gravity, body frame: roll and pitch of the base."""
     time: float = 0.0
-    """[s]; only differences count."""
+    """From the start [s]."""
     period: float = CONTROL_PERIOD
     """From the step before to this one [s]."""
     yaw: Float[np.ndarray, " N"] | None = None

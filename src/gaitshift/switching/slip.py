@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.switching.signals import Signals
+from gaitshift.switching.statistic import check_positive
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -34,6 +35,9 @@ class Slip:
     unit = "m/s"
     width = 4
     needs = ("velocity_b", "angular_velocity_b")
+
+    def __post_init__(self) -> None:
+        check_positive(self, "window")
 
     def start(self, n: int) -> SlipState:
         """State of n robots that have not been seen."""

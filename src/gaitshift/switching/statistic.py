@@ -1,10 +1,12 @@
 """What conditions watch: a few numbers a step and robot, which grow with the ground's roughness."""
 
+import math
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift.errors import GaitshiftError
 from gaitshift.switching.signals import Signals
 
 S = TypeVar("S")
@@ -40,6 +42,14 @@ class Statistic(Protocol[S]):
     def step(self, state: S, signals: Signals) -> tuple[S, Float[np.ndarray, "N M"]]:
         """Takes in one control step; nothing given is written to."""
         ...
+
+
+def check_positive(statistic: object, *names: str) -> None:
+    """`GaitshiftError` unless these settings of a statistic are finite numbers above 0."""
+    for name in names:
+        value: float = getattr(statistic, name)
+        if not (math.isfinite(value) and value > 0.0):
+            raise GaitshiftError(f"{name} = {value:g}: a number above 0 would be right")
 
 
 AnyStatistic = Statistic[Any]

@@ -7,7 +7,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.command import CONTROL_PERIOD
+from gaitshift.command import CONTROL_PERIOD, Command
 from gaitshift.errors import GaitshiftError
 from gaitshift.motion import Motion
 from gaitshift.switching.controller import Controller
@@ -36,8 +36,11 @@ class Decision:
 class Switcher(Protocol):
     """Looks at the motion once a control step and changes gaits through what drives them."""
 
-    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
-        """Decides for all robots at `time` [s]."""
+    def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:
+        """Decides for all robots at `time` [s]; `command` is what is wanted of them.
+
+        What a speed loop makes of it, and the driver is asked for, may be something else.
+        """
         ...
 
 
@@ -79,13 +82,11 @@ class Autonomous:
             raise GaitshiftError("a graph with the same edges and statistics would be right")
         self.graph = graph
 
-    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:
         """Lets the edges count; where one fires, the robot changes to the gait it leads to."""
         rough = None if self._sees is None else self._sees(motion)
         value = driver.value() if self._asks_critic else None
-        signals = Signals.from_motion(
-            motion, time=time, command=driver.command, value=value, rough=rough
-        )
+        signals = Signals.from_motion(motion, time=time, command=command, value=value, rough=rough)
         values: dict[str, np.ndarray] = {}
         for name, statistic in self._statistics.items():
             self._memory[name], values[name] = statistic.step(self._memory[name], signals)
@@ -123,9 +124,9 @@ class Autonomous:
             takes = free & fire[:, index]
             driver.switch(np.flatnonzero(takes), edges[index].target, motion)
             free &= ~takes
+            # the edges of the new gait start anew or, as there is one k in the paper, go on from it
+            self._k[takes] = 0.0 if self.graph.reset else self._k[takes, index, None]
         self._time_in_gait[~free] = 0.0
-        if self.graph.reset:
-            self._k[~free] = 0.0
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ class Scheduled:
     plan: tuple[tuple[float, str], ...]
     """Times [s] and the gait that begins there, in order."""
 
-    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:
         """Carries out what fell due in the control step that ends at `time`."""
         late = time + _ROUNDING
         for start, gait in self.plan:

@@ -40,6 +40,8 @@ class Touches:
     def __post_init__(self) -> None:
         if not 1 <= self.kept <= 100:
             raise GaitshiftError(f"touches = {self.kept}: 1 to 100 a foot would be right")
+        if not 0.0 <= self.least_swing < np.inf:
+            raise GaitshiftError(f"least_swing = {self.least_swing:g}: 0 s or more would be right")
 
     def start(self, n: int) -> TouchState:
         """State of n robots of which no foot has touched."""

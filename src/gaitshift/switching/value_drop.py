@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.switching.signals import Signals
+from gaitshift.switching.statistic import check_positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +21,9 @@ class ValueDrop:
     unit = ""
     width = 1
     needs = ("value",)
+
+    def __post_init__(self) -> None:
+        check_positive(self, "fast", "slow")
 
     def start(self, n: int) -> Float[np.ndarray, "N 3"]:
         """Fast mean, slow mean, and the steps seen."""
