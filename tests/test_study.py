@@ -124,6 +124,10 @@ def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
     assert "trot only over 0.05 m is there already" in said
     assert "oracle over" not in said
     assert table.read_text() == whole
+    with pytest.raises(SystemExit) as end:
+        main([*command, "--seed", "3"])
+    assert end.value.code == 2
+    assert "crossings with seed = 0, not 3" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_the_figure_shows_every_way_with_its_survival(tmp_path):

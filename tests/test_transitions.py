@@ -144,6 +144,12 @@ def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
     assert "trot to pace on flat is there already" in said.err
     assert "pace to trot" not in said.err
     assert table.read_text() == whole
+    with pytest.raises(SystemExit) as end:  # or the totals would be of two measurements
+        main([part if part != "8" else "9" for part in command])
+    assert end.value.code == 2
+    said = capsys.readouterr().err.splitlines()[-1]
+    assert f"{table} has shifts with switches = 8, not 9" in said
+    assert table.read_text() == whole
 
 
 @pytest.mark.parametrize(
@@ -152,7 +158,8 @@ def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
         (["trot"], "two gaits"),
         (["trot", "canter"], "canter"),
         (["trot", "pace", "--switches", "0"], "0 switches"),
-        (["trot", "pace", "--grounds", "lava"], "lava"),
+        (["trot", "trot"], "two gaits"),
+        (["trot", "pace", "--grounds", "flat", "lava"], "lava"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, message):

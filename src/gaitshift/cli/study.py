@@ -60,10 +60,16 @@ class Study:
         every = ways(self.flat_gait, self.rough_gait, self.conditions)
         loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
         path = self.out / TABLE
-        rows = kept_rows(path, COLUMNS, "crossings", overwrite=self.overwrite)
+        rows = kept_rows(
+            path,
+            COLUMNS,
+            "crossings",
+            overwrite=self.overwrite,
+            alike={"seed": self.seed, "runs": self.runs},
+        )
         for amplitude in self.amplitudes:
             for way in every:
-                if any(is_of(row, way, amplitude, self.seed, self.runs) for row in rows):
+                if any(is_of(row, way, amplitude) for row in rows):
                     say(f"{way.name} over {amplitude:g} m is there already, and kept")
                     continue
                 with progress(f"{way.name}, {amplitude:g} m") as report:

@@ -14,6 +14,7 @@ from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.table import write_rows
+from gaitshift.terrain import from_spec
 
 TABLE, PAGE = "transitions.csv", "page.html"
 
@@ -53,17 +54,25 @@ class Transitions:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        names = policies.shipped() if self.gaits == ("all",) else self.gaits
-        if len(set(names)) < 2:
+        names = policies.shipped() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
+        if len(names) < 2:
             raise GaitshiftError("a shift needs two gaits or more")
         check_numbers("switches", self.switches, self.seed)
         loaded = {name: policies.load(name) for name in names}
+        for ground in self.grounds:
+            from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # a fault is told at once
         path = self.out / TABLE
-        rows = kept_rows(path, COLUMNS, "shifts", overwrite=self.overwrite)
+        rows = kept_rows(
+            path,
+            COLUMNS,
+            "shifts",
+            overwrite=self.overwrite,
+            alike={"seed": self.seed, "switches": self.switches},
+        )
         for ground in self.grounds:
             for old, new in permutations(names, 2):
                 pair = Pair(old, new)
-                if any(is_of(row, pair, ground, self.seed, self.switches) for row in rows):
+                if any(is_of(row, pair, ground) for row in rows):
                     say(f"{old} to {new} on {ground} is there already, and kept")
                     continue
                 with progress(f"{old} to {new}, {ground}") as report:

@@ -72,10 +72,9 @@ def mean_of(values: Float[np.ndarray, " K"]) -> tuple[float | str, float | str]:
     return round(float(values.mean()), 4), round(half, 4)
 
 
-def is_of(row: Row, way: Way, amplitude: float, seed: int, runs: int) -> bool:
-    """Whether a row holds these very crossings."""
-    wanted = (amplitude, way.name, seed, runs)
-    return tuple(row[name] for name in ("amplitude", "way", "seed", "runs")) == wanted
+def is_of(row: Row, way: Way, amplitude: float) -> bool:
+    """Whether a row holds the crossings of this way over this noise."""
+    return (row["amplitude"], row["way"]) == (amplitude, way.name)
 
 
 def page(rows: Sequence[Row], command: str) -> str:

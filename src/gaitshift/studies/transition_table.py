@@ -59,7 +59,6 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
     }
 
 
-def is_of(row: Row, pair: Pair, ground: str, seed: int, switches: int) -> bool:
-    """Whether a row holds these very shifts."""
-    wanted = (pair.old, pair.new, ground, seed, switches)
-    return tuple(row[name] for name in ("old", "new", "ground", "seed", "switches")) == wanted
+def is_of(row: Row, pair: Pair, ground: str) -> bool:
+    """Whether a row holds the shifts of this pair on this ground."""
+    return (row["old"], row["new"], row["ground"]) == (pair.old, pair.new, ground)

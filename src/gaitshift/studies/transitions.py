@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.command import CONTROL_PERIOD
+from gaitshift.command import CONTROL_PERIOD, Command
 from gaitshift.evaluation.evaluate import grounds_of, starts
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.gait_analysis.base import forward_speed
@@ -90,7 +90,9 @@ class _AtSteps:
     step_of: Int[np.ndarray, " N"]
     gait: str
 
-    def step(self, time: float, motion: Motion, driver: Controller) -> Decision:
+    def step(
+        self, time: float, motion: Motion, driver: Controller, command: Command
+    ) -> Decision:
         """Changes those that are due in the control step that ends at `time`."""
         now = round(time / CONTROL_PERIOD)
         driver.switch(np.flatnonzero(self.step_of == now), self.gait, motion)
