@@ -18,6 +18,10 @@ Report = Callable[[int, int], None]
 """Takes the work done and the work in all."""
 
 
+_WHOLE = 1000
+"""Columns that hold any table."""
+
+
 def say(line: str) -> None:
     """One line for people, on stderr."""
     print(line, file=sys.stderr)
@@ -29,12 +33,14 @@ def emit_json(data: Any) -> None:
 
 
 def emit_table(title: str, rows: Sequence[tuple[str, ...]]) -> None:
-    """A short table on stdout."""
+    """A short table on stdout; whole where that is no terminal, else folded into its width."""
     table = Table(title=title, show_header=False, title_justify="left")
     table.add_column(no_wrap=True)  # names; what does not fit is broken in the other columns
+    for _ in range(max(map(len, rows), default=1) - 1):
+        table.add_column(overflow="fold")
     for row in rows:
         table.add_row(*(escape(cell) for cell in row))  # units stand in brackets, as markup does
-    Console().print(table)
+    Console(width=None if sys.stdout.isatty() else _WHOLE).print(table)
 
 
 @contextmanager
