@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from gaitshift import gaits, policy
@@ -18,19 +19,22 @@ from gaitshift.benchmark.outcome import (
     COLUMNS,
     Outcome,
     middle,
+    outcome_of,
     ratio,
     ratio_text,
     row_of,
     summary,
 )
-from gaitshift.benchmark.time_to_gait import TimeToGait, time_to_gait
+from gaitshift.benchmark.time_to_gait import BASELINE, OURS, TimeToGait, fingerprint, time_to_gait
 from gaitshift.benchmark.vec_env import GaitVecEnv
 from gaitshift.cli import main
+from gaitshift.cli.bench import _text
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.plots import time_to_gait_figure
 from gaitshift.table import read_rows, write_rows
 from gaitshift.terrain import flat
+from gaitshift.training.export import describe, write
 from gaitshift.training.recipe import Recipe, Stage
 
 TROT = gaits.load("trot")
@@ -50,6 +54,7 @@ def outcome(gait="trot", learner="gaitshift", seconds=10.0, *, reached=True, see
         survival=1.0,
         speed=1.2,
         pattern_fraction=0.7,
+        recipe="0123456789ab",
     )
 
 
@@ -137,6 +142,7 @@ def test_both_learners_repeat_themselves_from_a_seed(tmp_path):
         (1.00, 1.09, 0.90, False),
         (1.00, 1.31, 0.90, False),
         (1.00, 1.20, 0.59, False),
+        (0.00, None, None, False),
     ],
 )
 def test_a_check_is_passed_by_all_three_figures_at_once(survival, speed, pattern, passed):
@@ -201,9 +207,73 @@ def test_only_training_is_timed_up_to_the_first_passed_check_or_the_limit(
     monkeypatch.setattr(race, "time", clock)
     clock.now, clock.checks = 0.0, 0
     entry = race._Entry(name="x", build=lambda *_: Scripted(clock, file), **limits)
-    found = race._train(entry, TROT, 4, ScriptedCheck())
+    found = race._train(entry, TROT, 4, TimeToGait(check=ScriptedCheck()))
     assert (found.reached, found.seconds, found.steps) == expected
     assert (found.gait, found.learner, found.seed) == ("trot", "x", 4)
+
+
+def test_of_robots_that_all_fall_at_once_the_line_and_the_table_say_what_there_is(tmp_path):
+    """Folded legs bring every body to the ground within the warm-up: no speed, no pattern."""
+    env = GaitEnv(TROT, flat(20.0, 20.0), 2, config=SMALL.env, threads=1)
+    layer = torch.nn.Linear(env.observe.size, 12)
+    with torch.no_grad():
+        layer.weight.zero_()
+        layer.bias.copy_(torch.from_numpy(FOLD))
+    write([layer], describe(env, {}), tmp_path / "fold.onnx")
+    figures = Check(robots=2, seconds=2.5).see(policy.load(tmp_path / "fold.onnx"))
+    assert figures == Figures(survival=0.0, speed=None, pattern_fraction=None)
+    fallen = replace(outcome(reached=False), survival=0.0, speed=None, pattern_fraction=None)
+    assert _text(fallen) == "> 10 s, > 0.01 M steps (survival 0.00, – m/s, pattern –)"
+    write_rows(tmp_path / "table.csv", COLUMNS, [row_of(fallen)])
+    assert (tmp_path / "table.csv").read_text().splitlines()[1].endswith(",0.0,,,0123456789ab")
+    (row,) = read_rows(tmp_path / "table.csv", COLUMNS, "trainings")
+    assert outcome_of(row) == fallen
+    with pytest.raises(GaitshiftError, match="the seconds of a training is missing"):
+        outcome_of(row | {"seconds": ""})
+
+
+def test_a_fingerprint_is_of_recipe_check_machine_and_the_learners_own_rollout():
+    config = TimeToGait()
+
+    def prints(config, machine=TROT):
+        return [fingerprint(config, learner, machine) for learner in (OURS, BASELINE)]
+
+    first = prints(config)
+    assert first == prints(TimeToGait(seeds=7, baseline_budget=3.0, gaits=("pace",)))
+    both = [
+        prints(replace(config, recipe=replace(config.recipe, strict_from=61))),
+        prints(replace(config, check=Check(robots=63))),
+        prints(config, gaits.load("pace")),
+    ]
+    assert all(len({*first, *changed}) == 4 for changed in both)
+    ours, baseline = first
+    assert prints(replace(config, baseline_rollout=1024))[0] == ours
+    assert prints(replace(config, baseline_rollout=1024))[1] != baseline
+    assert prints(replace(config, check_every=9))[0] != ours
+    assert prints(replace(config, check_every=9))[1] == baseline
+
+
+def test_trainings_of_another_recipe_are_measured_anew_and_stay_in_the_table(
+    tmp_path, monkeypatch, capsys
+):
+    def told(entry, machine, seed, config):
+        made = outcome(machine.name, entry.name, seconds=1.0, seed=seed)
+        return replace(made, recipe=fingerprint(config, entry.name, machine))
+
+    monkeypatch.setattr(race, "_train", told)
+    table = tmp_path / "time_to_gait.csv"
+    write_rows(table, COLUMNS, [row_of(outcome(seconds=40.0))])
+    command = ["bench", "time-to-gait", "--quick", "--out", str(tmp_path)]
+    for _ in range(2):  # what the first call measured, the second knows
+        main(command)
+        capsys.readouterr()
+        rows = read_rows(table, COLUMNS, "trainings")
+        assert [(r["learner"], r["seconds"]) for r in rows] == [
+            (OURS, 1.0),
+            (BASELINE, 1.0),
+            (OURS, 40.0),
+        ]
+        assert [r["recipe"] == "0123456789ab" for r in rows] == [False, False, True]
 
 
 def test_learners_take_turns_and_a_budget_of_nothing_leaves_the_baseline_out(monkeypatch):
@@ -229,11 +299,14 @@ def test_trainings_that_are_known_are_not_repeated_but_where_more_would_be_told(
     monkeypatch.setattr(race, "_train", told)
     config = TimeToGait(gaits=("trot",), seeds=3, baseline_budget=50.0)
     known = [
-        outcome(seed=0, seconds=40.0),
-        outcome(learner="stable-baselines3", seed=0, seconds=51.0, reached=False),
-        outcome(learner="stable-baselines3", seed=1, seconds=49.0, reached=False),
-        outcome("pace", seed=1, seconds=40.0),
-        outcome(seed=2, seconds=2000.0, reached=False),
+        replace(one, recipe=fingerprint(config, one.learner, gaits.load(one.gait)))
+        for one in (
+            outcome(seed=0, seconds=40.0),
+            outcome(learner="stable-baselines3", seed=0, seconds=51.0, reached=False),
+            outcome(learner="stable-baselines3", seed=1, seconds=49.0, reached=False),
+            outcome("pace", seed=1, seconds=40.0),
+            outcome(seed=2, seconds=2000.0, reached=False),
+        )
     ]
     assert [o.seconds for o in time_to_gait(config, known)] == [40.0, 51.0, 1.0, 1.0, 2000.0, 1.0]
 
@@ -291,7 +364,7 @@ def test_the_table_and_the_figure_show_every_training(tmp_path):
     ]
     write_rows(tmp_path / "time_to_gait.csv", COLUMNS, [row_of(o) for o in outcomes])
     rows = read_rows(tmp_path / "time_to_gait.csv", COLUMNS, "trainings")
-    assert [Outcome(**row) for row in rows] == outcomes
+    assert [outcome_of(row) for row in rows] == outcomes
     figure = time_to_gait_figure(outcomes, tmp_path / "time_to_gait.png")
     axes = figure.axes[0]
     dots = [line.get_xdata()[0] for line in axes.lines if line.get_marker() == "o"]

@@ -111,6 +111,79 @@ def test_an_output_folder_with_other_content_is_left_alone(
     assert list(tmp_path.iterdir()) == [mine]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["train", "--resume", "file"], "file is not a training run"),
+        (["train", "trot", *TINY, "--out", "file/x"], "file/x: Not a directory"),
+        (["gaits", "--out", "file/x"], "file/x: Not a directory"),
+        (["evaluate", "trot", "--log", "file/x.npz"], "file: File exists"),
+        (
+            ["evaluate", "trot", "--log", ".", "--overwrite"],
+            ". is a folder; give a file with --log",
+        ),
+        (["reproduce", "--runs", "file/x"], "file is a file"),
+    ],
+)
+def test_a_file_where_a_folder_should_be_is_one_line_before_any_work(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
+) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    monkeypatch.setattr("gaitshift.cli.evaluate.evaluate", work)
+    monkeypatch.setattr("gaitshift.training.run.Run.__init__", work)
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("years of work")
+    assert says in refusal(capsys, *arguments)
+    assert Path("file").read_text() == "years of work"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_full_disk_is_one_line_with_the_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
+) -> None:
+    def full(self: Log, path: Path) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Log, "save", full)
+    path = tmp_path / "walk.npz"
+    with pytest.raises(SystemExit) as exit_:
+        main(["evaluate", "trot", "--episodes", "1", "--seconds", "0.1", "--log", str(path)])
+    assert exit_.value.code == 2
+    assert capsys.readouterr().err.strip() == f"gaitshift: {path}: No space left on device"
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_has_seen_enough_is_no_fault(unbuffered: str) -> None:
+    """Its end of the pipe is closed before anything is written."""
+    command = [sys.executable, "-m", "gaitshift", "gaits", "--json"]
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True
+    ) as process:
+        assert process.stdout
+        assert process.stderr
+        process.stdout.close()
+        said = process.stderr.read()
+    assert (process.returncode, said) == (0, "")
+
+
+def test_a_pipe_that_breaks_elsewhere_is_told(tmp_path: Path) -> None:
+    program = """
+from gaitshift.cli import main
+from gaitshift.cli.gaits import Gaits
+def broken(self):
+    raise BrokenPipeError(32, "Broken pipe")
+Gaits.run = broken
+main(["gaits"])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.strip()) == (2, "gaitshift: Broken pipe")
+
+
 def test_json_is_one_object_and_nothing_else_on_stdout(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -166,6 +239,8 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
     assert row["verdict"]["gait"] == "none"
     assert row["verdict"]["clean"] is False
     assert (out / "verdicts.csv").read_text().splitlines()[-1].startswith("2,none,False,")
+    main(["train", "--resume", str(out), "--json"])
+    assert json.loads(capsys.readouterr().out) == row, "a run that is over tells the same again"
     main(["evaluate", row["policy"], "--episodes", "2", "--seconds", "0.2", "--json"])
     assert json.loads(capsys.readouterr().out)["episodes"] == 2
 

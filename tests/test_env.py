@@ -903,7 +903,6 @@ def test_a_push_moves_the_robot_its_way(monkeypatch):
         env.step(np.zeros((8, 12)))
         velocities.append(env.world.motion.base_linear_velocity_w)
     forces, velocities = np.array(forces), np.array(velocities)
-    assert not forces[0].any(), "nobody is pushed at the start"
     assert np.linalg.norm(forces, axis=2).max() <= 400.0 * np.hypot(1, env.config.push.vertical)
     pushed = 0
     for robot in range(8):

@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from gaitshift import gaits, policy
+from gaitshift.cli.record import Record
 from gaitshift.env import GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import (
@@ -18,6 +19,7 @@ from gaitshift.evaluation import (
     rollout,
     run_demo,
 )
+from gaitshift.evaluation.courses import COURSES
 from gaitshift.evaluation.evaluate import RUN_UP, grounds_of
 from gaitshift.log import Log
 from gaitshift.reward_machine import RewardMachine
@@ -267,6 +269,52 @@ def test_grounds_of_an_evaluation_reach_as_far_as_robots_can_walk() -> None:
     assert len({g.height.tobytes() for g in grounds}) == 8
     slope = from_spec("slope:15", seed=0, length=10.0, width=4.0)
     assert slope.height.max() == pytest.approx(10 * np.tan(np.radians(15)), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("terrain", "speed", "seconds", "needed"),
+    [
+        ("slope:10@4", 1.2, 10.0, "17 m or more"),  # 2 + 12 + 3
+        ("flat@2,perlin:0.05@2.8", 1.0, 2.0, "5 m or more"),  # 2 + 2 + 1
+        ("slope:10@16.9", 1.2, 10.0, "17 m or more"),
+        ("bank:5@2.5", 0.0, 10.0, "3 m or more"),
+    ],
+)
+def test_ground_that_ends_before_robots_do_is_refused_with_the_length_it_needs(
+    terrain: str, speed: float, seconds: float, needed: str
+) -> None:
+    with pytest.raises(GaitshiftError) as caught:
+        grounds_of(terrain, seed=0, speed=speed, seconds=seconds)
+    assert needed in str(caught.value)
+    assert terrain in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_ground_as_long_as_needed_and_flat_ground_of_any_length_are_taken() -> None:
+    for terrain in ("slope:10@17", "flat@4", "flat@2,flat@2", "perlin:0@1"):
+        assert grounds_of(terrain, seed=0, speed=1.2, seconds=10.0)
+
+
+def test_flat_ground_goes_on_beyond_its_field_and_no_other_does() -> None:
+    """Ten metres ahead of the end of a field a robot stands, or falls by half a g t²."""
+    robot, heights = policy.load("trot").robot, {}
+    for terrain in ("flat@4", "slope:1@4"):
+        world = World(robot, from_spec(terrain, seed=0, length=4.0, width=4.0), 1, threads=1)
+        noise = np.zeros((1, 12)) + robot.stance_angles
+        world.place(np.arange(1), xy=np.array([[14.0, 0.0]]), yaw=np.zeros(1), joint_position=noise)
+        before = world.motion.base_position_w[0, 2]
+        for _ in range(50):
+            world.step(noise)
+        heights[terrain] = world.motion.base_position_w[0, 2] - before
+    assert abs(heights["flat@4"]) < 0.05
+    assert heights["slope:1@4"] == pytest.approx(-0.5 * 9.81 * 0.5**2, abs=0.1)
+
+
+@pytest.mark.parametrize("course", COURSES, ids=lambda course: course.name)
+def test_courses_are_long_enough_for_what_is_recorded_by_default(course) -> None:
+    fastest = max(policy.load(gait).info.forward_speed for gait in policy.shipped())
+    seconds = Record.__dataclass_fields__["seconds"].default
+    assert grounds_of(course.terrain, seed=0, speed=fastest, seconds=seconds)
 
 
 def test_a_graph_is_asked_for_without_numbers_of_a_condition():

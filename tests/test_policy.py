@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.policy import PolicyInfo
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
-from gaitshift.training.export import describe, export
+from gaitshift.training.export import describe, export, write
 from gaitshift.training.learner import Learner, as_tensors
 from gaitshift.training.recipe import PpoConfig, Recipe
 
@@ -362,6 +363,78 @@ def test_metadata_that_is_no_json_is_refused(altered, name):
 def test_missing_metadata_is_refused(altered, name):
     line = refusal(altered(**{name: None}))
     assert name in line or "not a policy of gaitshift" in line
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        ("robot", '["anymal_b"]', "'robot' must be a text, not ['anymal_b']"),
+        ("machine", "[]", "'machine' must be a table of keys and values, not []"),
+        ("observation", "7", "'observation' must be a table of keys and values, not 7"),
+        ("observation", '{"contact": [0, 4.5]}', "give 'contact' a start and an end, not [0, 4.5]"),
+        ("observation", '{"contact": 4}', "give 'contact' a start and an end, not 4"),
+        ("action_scale", "0", "'action_scale' must be a finite number above 0, not 0"),
+        ("action_scale", "-0.3", "'action_scale' must be a finite number above 0, not -0.3"),
+        ("action_scale", "Infinity", "'action_scale' must be a finite number above 0, not inf"),
+        ("action_scale", "true", "'action_scale' must be a number, not True"),
+        ("stance", '["a", "b"]', "'stance' must be the angles of 12 joints, not ['a', 'b']"),
+        ("stance", "null", "'stance' must be the angles of 12 joints, not None"),
+        ("gains", "80", "'gains' must be a text, not 80"),
+        ("kp", '"stiff"', "'kp' must be a number, not 'stiff'"),
+        ("control_rate", "null", "'control_rate' must be a number, not None"),
+        ("forward_speed", '"fast"', "'forward_speed' must be a number, not 'fast'"),
+        ("forward_speed", "NaN", "'forward_speed' must be a finite number above 0, not nan"),
+        ("speed_range", "null", "'speed_range' must be two numbers, such as [0.4, 1.6], not None"),
+        ("speed_range", "[1.6, 0.4]", "'speed_range' must be two finite numbers, 0 or above and"),
+        (
+            "speed_range",
+            "[0.4]",
+            "'speed_range' must be two numbers, such as [0.4, 1.6], not [0.4]",
+        ),
+        ("stride_frequency", "0", "'stride_frequency' must be a finite number above 0, not 0"),
+        ("stride_frequency_range", "[0, 3]", "'stride_frequency_range' must begin above 0"),
+        ("training", '"long"', "'training' must be a table of keys and values, not 'long'"),
+    ],
+)
+def test_metadata_of_another_type_or_beyond_all_sense_is_named(altered, name, text, says):
+    line = refusal(altered(**{name: text}))
+    assert says in line
+    assert line.endswith("export it anew")
+
+
+def test_whatever_the_metadata_hold_the_error_is_ours(altered, made):
+    """Every entry in turn is something else: nothing but a policy or one line comes of it."""
+    odd = (None, True, -1, 0, 1e400, "", "x", [], [1, 2], [None], {}, {"x": [0, 1]}, {"x": None})
+    for name in PolicyInfo.__dataclass_fields__:
+        for value in odd:
+            with suppress(GaitshiftError):
+                policy.load(altered(**{name: json.dumps(value)}))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [("action", "deed", "no output 'action'"), ("observation", "view", "no input 'observation'")],
+)
+def test_a_network_without_what_a_policy_gives_and_takes_is_refused(made, tmp_path, old, new, says):
+    model = onnx.load(made[2])
+    for node in model.graph.node:
+        for names in (node.input, node.output):
+            names[:] = [new if name == old else name for name in names]
+    for end in (*model.graph.input, *model.graph.output):
+        end.name = new if end.name == old else end.name
+    path = tmp_path / "renamed.onnx"
+    onnx.save(model, str(path))
+    assert says in refusal(path)
+
+
+def test_a_network_of_another_number_of_actions_is_refused(made, tmp_path):
+    layer = torch.nn.Linear(made[0].mlp[0].in_features, 11)
+    path = tmp_path / "eleven.onnx"
+    write([layer], made[1], path)
+    model = onnx.load(path)
+    model.graph.output[0].type.tensor_type.shape.dim[1].dim_value = 11
+    onnx.save(model, str(path))
+    assert "gives 11 actions; 12" in refusal(path)
 
 
 def test_a_machine_that_breaks_the_laws_is_refused(made, altered):

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from rsl_rl.algorithms import PPO
 
 from gaitshift import gaits
 from gaitshift.cli import main
@@ -31,6 +33,7 @@ from gaitshift.reproduction.tables import curve_rows, run_rows, write
 from gaitshift.reproduction.told import Told
 from gaitshift.reproduction.training import FAILED, is_over, train
 from gaitshift.terrain import flat
+from gaitshift.training.learner import DivergedError
 from gaitshift.training.recipe import Recipe
 from gaitshift.training.run import Run
 
@@ -298,8 +301,8 @@ def test_an_ablation_is_held_against_as_many_seeds_and_iterations():
         ("blind", "trot"): seeds("blind", "trot", [course(300, walks=250)] * 3),
     }
     (finding,) = findings(Results(plan=Plan(), seeds=table))
-    assert "**u and δ shown** 0 of 3 walk (median from iteration never)" in finding.measured
-    assert "**u and δ hidden** 3 of 3 walk (median from iteration 250)" in finding.measured
+    assert "**u and δ shown** 0 of 3 walk (the median never)" in finding.measured
+    assert "**u and δ hidden** 3 of 3 walk (median iteration 250)" in finding.measured
 
 
 def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
@@ -335,6 +338,19 @@ def test_a_damaged_report_is_named(name, old, new, says, tmp_path):
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(GaitshiftError, match=re.escape(says)):
+        Told.read(Plan(), tmp_path)
+
+
+def test_a_figure_of_a_policy_that_is_no_number_is_named(tmp_path):
+    results = Results(plan=Plan(), seeds=like_the_paper())
+    write(run_rows(results), tmp_path / "runs.csv")
+    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    row = {"setting": "paper", "gait": "pace", "seed": 1, "walks_from_iteration": 86}
+    write([row | {"survival": 1.0, "speed_mean": None}], tmp_path / "gaits.csv")
+    told = Told.read(Plan(), tmp_path).figures
+    assert told == {"paper-pace-1": {"survival": 1.0, "speed_mean": None}}
+    write([row | {"survival": "all", "speed_mean": None}], tmp_path / "gaits.csv")
+    with pytest.raises(GaitshiftError, match=r"gaits\.csv, paper-pace-1 is damaged: .*'all'"):
         Told.read(Plan(), tmp_path)
 
 
@@ -388,19 +404,77 @@ def test_a_run_of_other_numbers_is_not_taken_for_this_one(tmp_path):
         is_over(replace(job, seed=1), tmp_path)
 
 
-def test_a_run_that_breaks_down_is_a_finding(tmp_path, monkeypatch):
+def spoil_update(monkeypatch, iteration, spoil):
+    """Lets `spoil` meet the learner before the update of an iteration, counted from 1."""
+    update, count = PPO.update, iter(range(1, 100))
+
+    def spoiled(self):
+        if next(count) == iteration:
+            spoil(self)
+        return update(self)
+
+    monkeypatch.setattr(PPO, "update", spoiled)
+
+
+def no_number(part):
+    """Makes one of the actor's parameters, or what was seen, not a number."""
+
+    def spoil(ppo):
+        with torch.no_grad():
+            if part == "returns":
+                ppo.storage.returns[0, 0] = torch.nan
+            else:
+                dict(ppo.actor.named_parameters())[part].flatten()[0] = torch.nan
+
+    return spoil
+
+
+@pytest.mark.parametrize("part", ["mlp.0.weight", "distribution.std_param", "returns"])
+def test_a_run_that_breaks_down_in_its_numbers_is_a_finding(part, tmp_path, monkeypatch):
     (job,) = tiny_jobs("multiply")
-
-    def iterate(self):
-        raise ValueError("the mean of a normal distribution is nan")
-
-    monkeypatch.setattr("gaitshift.training.learner.Learner.iterate", iterate)
+    spoil_update(monkeypatch, 2, no_number(part))
     train(job, tmp_path / job.name)
     assert is_over(job, tmp_path / job.name)
-    assert (tmp_path / job.name / FAILED).read_text().startswith("ValueError: the mean")
+    text = (tmp_path / job.name / FAILED).read_text()
+    assert text.startswith("the training broke down: ")
+    assert text.count("\n") == 1
     results = Results.read(Plan.tiny(), tmp_path)
     assert results.seeds["multiply", "trot"].broken == (True,)
+    assert len(results.seeds["multiply", "trot"].courses[0]) == 1
     assert results.seeds["multiply", "trot"].walking == 0
+
+
+def test_weights_that_are_no_numbers_are_told_before_anybody_acts_on_them(tmp_path):
+    (job,) = tiny_jobs("multiply")
+    run = Run.create(tmp_path / "run", job.machine, job.recipe, seed=0, command="test")
+    with torch.no_grad():
+        run.learner.ppo.actor.mlp[0].weight[3, 1] = torch.nan
+    with pytest.raises(DivergedError, match="broke down: an action is not a number"):
+        run.iterate()
+    with torch.no_grad():
+        run.learner.ppo.actor.distribution.std_param[2] = torch.nan
+    with pytest.raises(DivergedError, match=r"broke down: distribution\.std_param of the actor"):
+        run.iterate()
+
+
+@pytest.mark.parametrize(
+    "error", [OSError(28, "No space left on device"), RuntimeError("not enough memory")]
+)
+def test_what_else_ends_a_run_is_raised_and_the_same_call_goes_on(error, tmp_path, monkeypatch):
+    (job,) = tiny_jobs("multiply")
+
+    def spoil(ppo):
+        raise error
+
+    with monkeypatch.context() as context:
+        spoil_update(context, 3, spoil)
+        with pytest.raises(type(error)):
+            train(job, tmp_path / job.name)
+    assert not (tmp_path / job.name / FAILED).exists()
+    assert not is_over(job, tmp_path / job.name)
+    train(job, tmp_path / job.name)
+    assert is_over(job, tmp_path / job.name)
+    assert len(course_of(tmp_path / job.name)) == job.recipe.iterations
 
 
 def test_nothing_is_done_twice(tmp_path):
@@ -477,6 +551,8 @@ def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
         (["--jobs", "0"], "jobs = 0: 1 to 1024"),
         (["--seed", "-1"], "seed -1"),
         (["--out", "file"], "file is a file"),
+        (["--out", "file/x/y"], "file is a file"),
+        (["--runs", "file/x"], "file is a file"),
     ],
 )
 def test_a_fault_of_the_user_is_one_line(arguments, says, tmp_path, monkeypatch, capsys):

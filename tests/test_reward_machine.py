@@ -104,9 +104,12 @@ def machines(draw_from):
     if any(t["to"] == f"u{count}" for t in transitions):
         states.append({"name": f"u{count}", "accepting": True})
     dwell = pick(st.integers(0, 6))
+    if dwell == 0:  # then a dwell of an edge's own would be lost
+        transitions = [t | {"dwell": 0} if "dwell" in t else t for t in transitions]
     tables = TROT | {"dwell": dwell, "state": states, "transition": transitions}
     if pick(st.booleans()):
-        tables["dwell_range"] = [pick(st.integers(0, dwell)), dwell + pick(st.integers(0, 9))]
+        least = pick(st.integers(min(1, dwell), dwell))
+        tables["dwell_range"] = [least, dwell + pick(st.integers(0, 9))]
         tables |= {"speed": 0.5, "speed_range": [0.25, 0.75]}
     return tables
 
@@ -569,6 +572,19 @@ FAULTS = [
     (edited(dwell_range=[10, 20.5]), "dwell_range must be two whole numbers of control steps"),
     (edited(dwell_range=[10, float("inf")]), "dwell_range must be two whole numbers of control"),
     (edited(dwell_range=[float("nan"), 30]), "dwell_range must be two whole numbers of control"),
+    (
+        edited(dwell_range=[0, 30]),
+        "dwell_range must begin at 1 or above where dwell is 20: a command",
+    ),
+    (
+        edited(dwell=0, transition__2__dwell=20),
+        T2 + "a dwell of 20 would be lost, since the machine's own is 0; give that 1 or above",
+    ),
+    (edited(speed=0), "speed must be above 0 m/s; its range may begin at 0"),
+    (
+        edited(speed=0.0, speed_range=[0.0, 1.0]),
+        "speed must be above 0 m/s; its range may begin at 0",
+    ),
     (edited(dwell_range=[10, 1001]), "dwell must be 0 to 1000 control steps, not 1001"),
     (edited(dwell_range=[20]), "'dwell_range' must be two numbers, such as [0.4, 1.6], not [20]"),
     (edited(dwell_range=20), "'dwell_range' must be two numbers, such as"),
@@ -675,6 +691,12 @@ def test_ranges_are_read_and_left_out_they_are_the_gaits_own_value_alone():
     silent = RewardMachine.from_dict(TROT)
     # 1.2 m/s is the paper's speed.
     assert (silent.dwell_range, silent.speed, silent.speed_range) == ((20, 20), 1.2, (1.2, 1.2))
+
+
+def test_a_machine_without_any_lock_out_and_a_speed_range_from_rest_are_lawful():
+    free = RewardMachine.from_dict(TROT | {"dwell": 0, "speed": 0.5, "speed_range": [0, 1]})
+    assert (free.dwell, free.dwell_range, free.speed_range) == (0, (0, 0), (0.0, 1.0))
+    assert {edge.guard.dwell for edge in free.edges} == {0}
 
 
 # Files and drawings -----------------------------------------------------------------------------

@@ -4,14 +4,18 @@ import csv
 import json
 import shutil
 from dataclasses import fields, replace
+from inspect import signature
 
 import numpy as np
 import onnx
 import pytest
+import stable_baselines3
 import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
 from tensordict import TensorDict
 
 from gaitshift import gaits, policy
+from gaitshift.benchmark.vec_env import GaitVecEnv
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
 from gaitshift.reward import BONUS_SHARES, RewardConfig
@@ -19,6 +23,7 @@ from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
 from gaitshift.training.ground import draw_grounds, stage_at
 from gaitshift.training.learner import Learner
+from gaitshift.training.lines import append, last
 from gaitshift.training.recipe import PRESETS, PpoConfig, Recipe, Stage
 from gaitshift.training.run import Run
 from gaitshift.world import PushConfig
@@ -139,6 +144,33 @@ def test_the_paper_preset_has_the_papers_figures():
     assert recipe.env.gains == "paper"
     assert recipe.strictness(0) == recipe.strictness(499) == 0.0
     assert recipe.env.command_share == recipe.env.heading_range == 0.0
+
+
+def test_the_paper_preset_has_the_defaults_of_stable_baselines3_but_for_those_told():
+    def defaults(kind):
+        return {name: p.default for name, p in signature(kind.__init__).parameters.items()}
+
+    recipe = PRESETS["paper"]()
+    ours, theirs, network = recipe.ppo, defaults(stable_baselines3.PPO), defaults(ActorCriticPolicy)
+    assert (ours.epochs, ours.learning_rate) == (theirs["n_epochs"], theirs["learning_rate"])
+    assert (ours.discount, ours.gae_lambda) == (theirs["gamma"], theirs["gae_lambda"])
+    assert (ours.clip, ours.entropy) == (theirs["clip_range"], theirs["ent_coef"])
+    assert (ours.clip_values, theirs["clip_range_vf"]) == (False, None)
+    assert (ours.desired_kl, theirs["target_kl"]) == (0.0, None)
+    assert ours.initial_std == np.exp(network["log_std_init"])
+    samples = recipe.robots * recipe.steps
+    assert ours.mini_batches == -(-samples // theirs["batch_size"])
+    assert samples // ours.mini_batches == theirs["batch_size"] - 1
+
+    env = GaitEnv(TROT, flat(20.0, 20.0), 2, config=recipe.env, threads=1)
+    ppo = Learner(env, replace(recipe, robots=2)).ppo
+    adam = ppo.optimizer.param_groups[0]
+    assert (ppo.value_loss_coef, theirs["vf_coef"]) == (1.0, 0.5)
+    assert (ppo.max_grad_norm, theirs["max_grad_norm"]) == (1.0, 0.5)
+    assert (ppo.normalize_advantage_per_mini_batch, theirs["normalize_advantage"]) == (False, True)
+    baseline = stable_baselines3.PPO("MlpPolicy", GaitVecEnv(env), device="cpu")
+    assert (adam["eps"], baseline.policy.optimizer.param_groups[0]["eps"]) == (1e-8, 1e-5)
+    assert (ppo.schedule, adam["lr"]) == ("fixed", theirs["learning_rate"])
 
 
 @pytest.mark.parametrize(
@@ -490,6 +522,84 @@ def test_the_policy_of_every_checkpoint_is_judged_once_though_the_run_was_killed
     assert judged == [int(line["iteration"]) for line in lines] == [2, 4, 6]
     assert {line["gait"] for line in lines} == {"trot"}
     assert lines[0]["misses"] == "speed_error 0.2; clearance FL 0.01"
+
+
+@pytest.mark.parametrize("half_a_line", [False, True])
+def test_a_policy_whose_judging_was_broken_off_is_judged_first_when_the_run_goes_on(
+    tmp_path, whole, half_a_line
+):
+    judged = []
+
+    def judge(path):
+        iterations = policy.load(path).info.training["iterations"]
+        if iterations == 4 and 4 not in judged:
+            judged.append(4)
+            raise KilledError
+        judged.append(iterations)
+        return {"gait": "trot", "clean": False}
+
+    folder = tmp_path / "run"
+    with pytest.raises(KilledError):
+        create(folder).train(judge=judge)
+    if half_a_line:
+        with (folder / "verdicts.csv").open("a") as file:
+            file.write("4,tr")
+    run = Run.resume(folder)
+    run.train(judge=judge)
+    assert judged == [2, 4, 4, 6]
+    with (folder / "verdicts.csv").open(newline="") as file:
+        assert [line["iteration"] for line in csv.DictReader(file)] == ["2", "4", "6"]
+    assert same_bits(weights(run), weights(whole[0])), "and it trains as if it had not been"
+    assert rows(folder) == rows(whole[0].folder)
+    Run.resume(folder).train(judge=judge)
+    assert judged == [2, 4, 4, 6], "nothing is judged twice"
+
+
+def test_the_last_line_comes_back_as_it_was_written(tmp_path):
+    lines = [
+        {"iteration": 2, "stage": "flat", "speed": 1.0, "gait": "none", "clean": False},
+        {"iteration": 4, "stage": "1", "speed": 2.5e-05, "gait": "trot", "clean": True},
+        {"iteration": 6, "stage": "rough", "speed": None, "gait": "", "clean": True},
+    ]
+    for line in lines:
+        append(tmp_path / "lines.csv", line)
+    for iteration, line in ((3, 0), (4, 1), (5, 1), (9, 2)):
+        found = last(tmp_path / "lines.csv", iteration)
+        assert found == lines[line]
+        assert list(map(type, found.values())) == list(map(type, lines[line].values()))
+    assert last(tmp_path / "lines.csv", 1) == last(tmp_path / "none.csv", 9) == {}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (b"\n2,", b"\ntwo,", "progress.csv, line 3 is damaged"),
+        (b"\n2,flat,", b"\n2,flat,flat,", "progress.csv, line 3 is damaged"),
+        (b"iteration,", b"iteratio,", "progress.csv, line 2 is damaged"),
+        (b"\n2,flat,", b"\n2,fl\xff\xfe,", "progress.csv is damaged: "),
+    ],
+)
+def test_a_damaged_progress_is_named_and_left_alone(copied, old, new, says):
+    path = copied / "progress.csv"
+    damaged = path.read_bytes().replace(old, new, 1)
+    assert damaged != path.read_bytes()
+    path.write_bytes(damaged)
+    with pytest.raises(GaitshiftError) as caught:
+        Run.resume(copied).train()
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert path.read_bytes() == damaged
+
+
+def test_a_config_of_another_network_than_the_checkpoints_is_named(copied):
+    file = copied / "config.json"
+    for hidden in ([32, 8], [16]):
+        config = json.loads(file.read_text())
+        config["recipe"]["ppo"]["hidden"] = hidden
+        file.write_text(json.dumps(config))
+        line = refusal(copied)
+        assert "000006.pt does not fit" in line
+        assert "config.json" in line
 
 
 def test_an_interrupted_run_leaves_the_policy_as_it_stands(tmp_path):

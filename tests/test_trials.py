@@ -13,6 +13,7 @@ from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.evaluation import SIZES, run_trials
 from gaitshift.evaluation import commands as commands_module
 from gaitshift.evaluation import trials as trials_module
+from gaitshift.evaluation.evaluate import field_length, grounds_of
 from gaitshift.evaluation.trials import TRIALS, Row, Size, distances, lateral_errors
 from gaitshift.terrain import flat, from_spec
 from gaitshift.training.export import describe, export
@@ -92,6 +93,14 @@ def test_grounds_of_trials_are_long_enough_and_level_where_robots_start(trial):
     rises = np.flatnonzero(np.diff(profile) > 1e-6)
     assert len(rises) >= 3
     assert rises.max() > 300
+
+
+@pytest.mark.parametrize("size", [SIZES["all"], TINY], ids=["all", "tiny"])
+@pytest.mark.parametrize("speed", [0.3, 1.2])
+def test_no_ground_of_a_trial_is_refused(size, speed):
+    for trial in TRIALS:
+        spec = trial.spec(field_length(speed, size.seconds))
+        grounds_of(spec, seed=0, speed=speed, seconds=size.seconds)
 
 
 def test_the_quick_trials_are_a_small_part_of_all():

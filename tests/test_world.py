@@ -13,7 +13,7 @@ from gaitshift.legs import LEGS
 from gaitshift.motion import Motion
 from gaitshift.robot import ANYMAL_B
 from gaitshift.terrain import flat, perlin, slope, step
-from gaitshift.world import World
+from gaitshift.world import PushConfig, Pusher, World
 from gaitshift.world.scene import build_model
 
 MASS = 30.4754
@@ -147,6 +147,21 @@ def test_a_push_acts_at_the_base_origin():
     for i in range(2):
         np.testing.assert_allclose(plain(world, i).subtree_angmom[1], turned[i], atol=0.005)
     assert np.linalg.norm(turned, axis=1).min() > 0.3
+
+
+def test_pushes_last_20_steps_200_apart_and_begin_anywhere_in_the_first_180():
+    """One robot in 180 is pushed in the very first step; binomial, five standard deviations."""
+    n = 10_000
+    pusher = Pusher(PushConfig(force=50.0), n, np.random.default_rng(7))
+    pushed = np.array([pusher.step().any(axis=1) for _ in range(400)])
+    first = pushed.argmax(axis=0)
+    step_of = (np.arange(400)[:, None] - first) % 200
+    np.testing.assert_array_equal(pushed, (np.arange(400)[:, None] >= first) & (step_of < 20))
+    assert (first.min(), first.max()) == (0, 179)
+    share, deviation = 1 / 180, np.sqrt(1 / 180 * 179 / 180 / n)
+    shares = np.bincount(first, minlength=180) / n
+    assert np.abs(shares - share).max() < 5 * deviation
+    assert abs(pushed[0].mean() - share) < 5 * deviation
 
 
 def test_a_push_ends_with_the_next_call():

@@ -3,7 +3,9 @@
 import json
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 from pathlib import Path
+from reprlib import repr as shortened
 from typing import Any, cast
 
 import numpy as np
@@ -14,6 +16,7 @@ from gaitshift.command import CONTROL_PERIOD
 from gaitshift.errors import GaitshiftError
 from gaitshift.observation import Observation
 from gaitshift.reward_machine import RewardMachine
+from gaitshift.reward_machine.reading import Table
 from gaitshift.robot import ROBOTS, Robot
 
 FORMAT_VERSION = 2
@@ -176,12 +179,99 @@ def _read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
         values = {name: json.loads(metadata[f"gaitshift.{name}"]) for name in fields}
     except json.JSONDecodeError as error:
         raise GaitshiftError(f"{path} has damaged metadata; export it anew") from error
-    return PolicyInfo(**values)
+    try:
+        return _info_of(values)
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{path}: metadata {error}; export it anew") from error
+
+
+def _info_of(values: dict[str, object]) -> PolicyInfo:
+    """The description in plain data, each value of its type and size.
+
+    Raises:
+        GaitshiftError: one that is not, by its key.
+    """
+    read = Table(values, keys=tuple(PolicyInfo.__dataclass_fields__))
+    info = PolicyInfo(
+        robot=read.text("robot"),
+        machine=_table(values, "machine"),
+        observation={
+            name: _ends(name, ends) for name, ends in _table(values, "observation").items()
+        },
+        action_scale=_above_0(read, "action_scale"),
+        stance=_angles(read, "stance"),
+        gains=read.text("gains"),
+        kp=read.number("kp"),
+        kd=read.number("kd"),
+        control_rate=_above_0(read, "control_rate"),
+        forward_speed=_above_0(read, "forward_speed"),
+        speed_range=_range(read, "speed_range"),
+        stride_frequency=_above_0(read, "stride_frequency"),
+        stride_frequency_range=_range(read, "stride_frequency_range"),
+        training=_table(values, "training"),
+        format_version=read.whole("format_version"),
+    )
+    if info.stride_frequency_range[0] == 0:
+        raise GaitshiftError("'stride_frequency_range' must begin above 0")
+    return info
+
+
+def _table(values: dict[str, object], key: str) -> dict[str, Any]:
+    value = values[key]
+    if not isinstance(value, dict):
+        raise GaitshiftError(f"{key!r} must be a table of keys and values, not {shortened(value)}")
+    return cast("dict[str, Any]", value)
+
+
+def _ends(name: str, ends: object) -> list[int]:
+    whole: list[int] = []
+    if isinstance(ends, list):
+        whole = [end for end in cast("list[object]", ends) if type(end) is int]
+    if len(whole) != 2 or ends != whole:
+        told = shortened(cast(object, ends))
+        raise GaitshiftError(f"'observation' must give {name!r} a start and an end, not {told}")
+    return whole
+
+
+def _above_0(read: Table, key: str) -> float:
+    value = read.number(key)
+    if not 0 < value < inf:
+        raise GaitshiftError(f"{key!r} must be a finite number above 0, not {value:g}")
+    return value
+
+
+def _angles(read: Table, key: str) -> list[float]:
+    value = read.get(key)
+    count = len(cast("list[object]", value)) if isinstance(value, list) else 12
+    return list(read.numbers(key, count, "the angles of 12 joints"))
+
+
+def _range(read: Table, key: str) -> list[float]:
+    low, high = read.numbers(key, 2, "two numbers, such as [0.4, 1.6]")
+    if not 0 <= low <= high < inf:
+        raise GaitshiftError(
+            f"{key!r} must be two finite numbers, 0 or above and rising, not {low:g} to {high:g}"
+        )
+    return [low, high]
 
 
 def _check(policy: Policy) -> None:
     """Refuses a policy whose robot is unknown or whose parts contradict each other."""
     info = policy.info
+    session: Any = policy.session
+    inputs, outputs = (
+        {one.name: one.shape for one in ends}
+        for ends in (session.get_inputs(), session.get_outputs())
+    )
+    for kind, name, there in (("input", "observation", inputs), ("output", "action", outputs)):
+        if name not in there or len(there[name]) != 2:
+            raise GaitshiftError(
+                f"its network has no {kind} '{name}' of N rows; export it anew from its run"
+            )
+    if outputs["action"][1] != 12:
+        raise GaitshiftError(
+            f"its network gives {outputs['action'][1]} actions; 12, one a joint, would be right"
+        )
     if info.robot not in ROBOTS:
         raise GaitshiftError(
             f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}; any other one needs "
@@ -201,7 +291,7 @@ def _check(policy: Policy) -> None:
     if list(robot.stance) != info.stance:
         raise GaitshiftError(f"it was trained from another stance of {robot.name}")
     expected = {name: [s.start, s.stop] for name, s in policy.observation.slices.items()}
-    wanted: Any = cast(Any, policy.session).get_inputs()[0].shape[1]
+    wanted = inputs["observation"][1]
     if expected != info.observation or wanted != policy.observation.size:
         raise GaitshiftError(
             f"its observation slices do not add up to its network's {wanted} inputs"

@@ -13,10 +13,10 @@ class Figures:
 
     survival: float
     """Share of the robots that did not fall."""
-    speed: float
-    """Mean forward speed [m/s]."""
-    pattern_fraction: float
-    """Share of the steps that show a stance of the gait's machine."""
+    speed: float | None
+    """Mean forward speed [m/s]; None where all fell in the warm-up."""
+    pattern_fraction: float | None
+    """Share of the steps that show a stance of the gait's machine; None as well."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,12 +40,14 @@ class Check:
         seen, _ = evaluate(policy, config)
         return Figures(
             survival=cast(float, seen["survival"]),
-            speed=cast(float, seen["speed_mean"]),
-            pattern_fraction=cast(float, seen["pattern_fraction"]),
+            speed=cast("float | None", seen["speed_mean"]),
+            pattern_fraction=cast("float | None", seen["pattern_fraction"]),
         )
 
     def is_passed(self, figures: Figures, own_speed: float) -> bool:
         """Whether the figures are those of the gait at `own_speed` [m/s]."""
+        if figures.speed is None or figures.pattern_fraction is None:
+            return False
         return (
             figures.survival >= self.survival
             and abs(figures.speed - own_speed) <= self.speed_error

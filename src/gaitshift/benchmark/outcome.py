@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 from math import floor
 from typing import Any
 
+from gaitshift.errors import GaitshiftError
 from gaitshift.table import Columns, Row
 
 
@@ -26,10 +27,12 @@ class Outcome:
     """Control steps of all robots up to there."""
     survival: float
     """Figures of the last check: share of the robots that did not fall,"""
-    speed: float
+    speed: float | None
     """mean forward speed [m/s],"""
-    pattern_fraction: float
-    """share of the steps that show a stance of the machine."""
+    pattern_fraction: float | None
+    """share of the steps that show a stance of the machine; None of both where all fell at once."""
+    recipe: str
+    """Fingerprint of what was trained and how it was checked (`time_to_gait.fingerprint`)."""
 
 
 def middle(outcomes: Sequence[Outcome]) -> Outcome:
@@ -100,10 +103,27 @@ COLUMNS: Columns = {
     "survival": float,
     "speed": float,
     "pattern_fraction": float,
+    "recipe": str,
 }
+
+_MAY_BE_EMPTY = ("speed", "pattern_fraction")
 
 
 def row_of(outcome: Outcome) -> Row:
-    """The line of a table that an outcome is; `Outcome(**row)` is it again."""
+    """The line of a table that an outcome is; `outcome_of` makes it one again."""
     row = asdict(outcome)
     return {name: round(x, 3) if isinstance(x, float) else x for name, x in row.items()}
+
+
+def outcome_of(row: Row) -> Outcome:
+    """The outcome that a line of a table is; figures that stand empty there are None.
+
+    Raises:
+        GaitshiftError: another cell is empty.
+    """
+    empty = [name for name, value in row.items() if value == ""]
+    for name in empty:
+        if name not in _MAY_BE_EMPTY:
+            raise GaitshiftError(f"the {name} of a training is missing")
+    values: Row = {**row, **dict.fromkeys(empty)}
+    return Outcome(**values)

@@ -1,5 +1,7 @@
 """Time to gait: how long training takes until a check is passed, beside a baseline's."""
 
+import hashlib
+import json
 import time
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -108,20 +110,39 @@ class _Entry:
         return steps >= self.most_steps or seconds >= self.most_seconds
 
 
+def fingerprint(config: TimeToGait, learner: str, machine: RewardMachine) -> str:
+    """Of all that decides what a training does and when it has its gait, but its seed."""
+    told = {
+        "machine": machine.to_dict(),
+        "recipe": asdict(config.recipe),
+        "check": asdict(config.check),
+        "rollout": config.check_every if learner == OURS else config.baseline_rollout,
+    }
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def is_of(config: TimeToGait, outcome: Outcome) -> bool:
+    """Whether a measurement would train the same as an outcome tells of, from whatever seed."""
+    if outcome.gait not in config.gaits:
+        return False
+    return outcome.recipe == fingerprint(config, outcome.learner, gaits.load(outcome.gait))
+
+
 def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator[Outcome]:
     """Trains every gait from every seed, ours and the baseline in turn; an outcome at a time.
 
-    Those that are `known` already are told as they are.
+    Those that are `known` already are told as they are; of another recipe, they are not known.
 
     Raises:
         GaitshiftError: a package that training needs is not installed.
     """
     entries = _entries(config)
+    known = [outcome for outcome in known if is_of(config, outcome)]
     for seed in range(config.seeds):
         for gait in config.gaits:
             for entry in entries:
                 told = (outcome for outcome in known if entry.knows(outcome, gait, seed))
-                yield next(told, None) or _train(entry, gaits.load(gait), seed, config.check)
+                yield next(told, None) or _train(entry, gaits.load(gait), seed, config)
 
 
 def _entries(config: TimeToGait) -> list[_Entry]:
@@ -154,8 +175,9 @@ def _entries(config: TimeToGait) -> list[_Entry]:
     return [ours, baseline]
 
 
-def _train(entry: _Entry, machine: RewardMachine, seed: int, check: Check) -> Outcome:
+def _train(entry: _Entry, machine: RewardMachine, seed: int, config: TimeToGait) -> Outcome:
     """Trains until a check is passed or the learner is given up; only training is timed."""
+    check = config.check
     with TemporaryDirectory() as folder:
         start = time.perf_counter()
         learner = entry.build(machine, seed, Path(folder))
@@ -176,4 +198,5 @@ def _train(entry: _Entry, machine: RewardMachine, seed: int, check: Check) -> Ou
                     seconds=seconds,
                     steps=learner.steps,
                     **asdict(figures),
+                    recipe=fingerprint(config, entry.name, machine),
                 )

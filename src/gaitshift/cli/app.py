@@ -1,6 +1,8 @@
 """Reads the command line, runs the subcommand, turns errors into one line and an exit code."""
 
 import io
+import os
+import select
 import sys
 from contextlib import redirect_stderr
 from typing import Annotated
@@ -42,17 +44,35 @@ INTERRUPTED = 130
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Runs the command line; ends the process with 0, 2 (bad input) or 130 (Ctrl-C)."""
+    """Runs the command line; ends the process with 0, 2 (bad input) or 130 (Ctrl-C).
+
+    A reader that has seen enough (`| head`) is no fault, and nothing is said of it.
+    """
     try:
         _parse(arguments).run()
+        sys.stdout.flush()  # here, where a closed pipe can still be met
     except GaitshiftError as error:
         say(f"gaitshift: {error}")
         sys.exit(2)
     except KeyboardInterrupt:
         say("gaitshift: interrupted")
         sys.exit(INTERRUPTED)
-    except BrokenPipeError:
-        sys.exit(0)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError) and _nobody_reads():
+            sys.exit(0)
+        where = "" if error.filename is None else f"{error.filename}: "
+        say(f"gaitshift: {where}{error.strerror or error}")
+        sys.exit(2)
+
+
+def _nobody_reads() -> bool:
+    """Whether it is stdout whose reader is gone; then what is left to print goes nowhere."""
+    look = select.poll()
+    look.register(sys.stdout.fileno(), 0)  # errors and hang-ups are told in any case
+    if not look.poll(0):
+        return False
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    return True
 
 
 def _parse(arguments: list[str] | None) -> Command:

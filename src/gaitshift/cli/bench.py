@@ -7,11 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from gaitshift import policy
-from gaitshift.benchmark.outcome import COLUMNS, Outcome, ratio_text, row_of, summary
+from gaitshift.benchmark.outcome import (
+    COLUMNS,
+    Outcome,
+    outcome_of,
+    ratio_text,
+    row_of,
+    summary,
+)
 from gaitshift.benchmark.speed import SpeedConfig, environment_speed, training_speed
 from gaitshift.cli.growing import kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.reward_machine.reading import located
 from gaitshift.table import write_rows
 
 if TYPE_CHECKING:
@@ -32,7 +40,8 @@ class TimeToGaitOptions:
     """Seconds of trot on few robots: shows that all of it works, not how fast it is."""
     out: Path | None = None
     """Folder for time_to_gait.csv and time_to_gait.png; trainings that the table has already are
-    kept, so that a command that was broken off goes on."""
+    kept, so that a command that was broken off goes on. Those of another recipe stay in the table
+    and are measured anew."""
     overwrite: bool = False
     """Begin anew where there are results already."""
 
@@ -141,14 +150,15 @@ class Bench:
         )
 
     def _measure_time_to_gait(self) -> None:
-        from gaitshift.benchmark.time_to_gait import time_to_gait
+        from gaitshift.benchmark.time_to_gait import is_of, time_to_gait
 
         options = self.time_to_gait
         config, out = options.config(), options.out
         known: list[Outcome] = []
         if out is not None:
             kept = kept_rows(out / TABLE, COLUMNS, "trainings", overwrite=options.overwrite)
-            known = [Outcome(**row) for row in kept]
+            with located(str(out / TABLE)):
+                known = [outcome_of(row) for row in kept]
         outcomes: list[Outcome] = []
         with progress("training") as report:
             for outcome in time_to_gait(config, known):
@@ -156,7 +166,9 @@ class Bench:
                 report(len(outcomes), config.trainings)
                 say(f"{outcome.gait}, seed {outcome.seed}, {outcome.learner}: {_text(outcome)}")
                 if out is not None:
-                    _write([*outcomes, *(one for one in known if not _told(one, outcomes))], out)
+                    told = [*outcomes, *(one for one in known if not _told(one, outcomes))]
+                    write_rows(out / TABLE, COLUMNS, [row_of(one) for one in told])
+                    _draw([one for one in told if is_of(config, one)], out)
         found = summary(outcomes)
         if self.json:
             emit_json({"check": asdict(config.check), "gaits": found})
@@ -164,27 +176,28 @@ class Bench:
         emit_table("time to gait, median over seeds (all seeds)", _rows(found))
 
 
-def _write(outcomes: list[Outcome], out: Path) -> None:
+def _draw(outcomes: list[Outcome], out: Path) -> None:
     from gaitshift.plots import time_to_gait_figure  # matplotlib is slow to import
 
-    write_rows(out / TABLE, COLUMNS, [row_of(outcome) for outcome in outcomes])
     time_to_gait_figure(outcomes, out / PICTURE)
 
 
 def _told(known: Outcome, outcomes: list[Outcome]) -> bool:
     """Whether there is an outcome of the same training by now."""
     return any(
-        (known.gait, known.learner, known.seed) == (one.gait, one.learner, one.seed)
+        (known.gait, known.learner, known.seed, known.recipe)
+        == (one.gait, one.learner, one.seed, one.recipe)
         for one in outcomes
     )
 
 
 def _text(outcome: Outcome) -> str:
     bound = "" if outcome.reached else "> "
+    speed = "–" if outcome.speed is None else f"{outcome.speed:.2f}"
+    pattern = "–" if outcome.pattern_fraction is None else f"{outcome.pattern_fraction:.2f}"
     return (
         f"{bound}{outcome.seconds:.0f} s, {bound}{outcome.steps / 1e6:.2f} M steps "
-        f"(survival {outcome.survival:.2f}, {outcome.speed:.2f} m/s, "
-        f"pattern {outcome.pattern_fraction:.2f})"
+        f"(survival {outcome.survival:.2f}, {speed} m/s, pattern {pattern})"
     )
 
 

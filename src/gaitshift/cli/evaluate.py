@@ -68,6 +68,8 @@ class Evaluate(EvaluationConfig):
         self._check_files()
         use_robot_file(self.robot_file)
         loaded = policies.load(self.policy)
+        if self.log is not None:
+            self.log.parent.mkdir(parents=True, exist_ok=True)
         if self.commands:
             self._command(loaded)
             return
@@ -76,7 +78,6 @@ class Evaluate(EvaluationConfig):
         else:
             figures, log = self._try(loaded, self.trials)
         if self.log is not None:
-            self.log.parent.mkdir(parents=True, exist_ok=True)
             log.save(self.log)
             say(f"log written to {self.log}")
         if self.plot is not None:
@@ -137,6 +138,8 @@ class Evaluate(EvaluationConfig):
     def _check_files(self) -> None:
         """Refuses what cannot be done before any work."""
         for option, path in (("--log", self.log), ("--plot", self.plot)):
+            if path is not None and path.is_dir():
+                raise GaitshiftError(f"{path} is a folder; give a file with {option}")
             if path is not None and path.exists() and not self.overwrite:
                 raise GaitshiftError(f"{path} exists; give another {option}, or --overwrite")
         if self.plot is not None:

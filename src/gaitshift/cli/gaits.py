@@ -39,6 +39,7 @@ class Gaits:
         files = tuple(f"{m.name}{ending}" for m in machines for ending in (".png", ".mmd"))
         if self.out is not None:
             check_folder(self.out, overwrite=self.overwrite, ours=files)
+            self.out.mkdir(parents=True, exist_ok=True)
         if self.json:
             emit_json({machine.name: machine.to_dict() for machine in machines})
         elif self.gait is None:
@@ -47,7 +48,6 @@ class Gaits:
         else:
             print(mermaid(machines[0]))
         if self.out is not None:
-            self.out.mkdir(parents=True, exist_ok=True)
             for machine in machines:
                 draw(machine, self.out / f"{machine.name}.png")
                 (self.out / f"{machine.name}.mmd").write_text(mermaid(machine) + "\n")

@@ -57,8 +57,9 @@ class Reproduce:
         runs = self.runs or (QUICK_RUNS if self.quick else RUNS)
         out = self.out or (QUICK_RESULTS if self.quick else RESULTS)
         for folder in (runs, out):
-            if folder.exists() and not folder.is_dir():
-                raise GaitshiftError(f"{folder} is a file; a folder would be right")
+            there = next(path for path in (folder, *folder.parents) if path.exists())
+            if not there.is_dir():
+                raise GaitshiftError(f"{there} is a file; a folder would be right")
         plan = Plan.tiny(self.seed) if self.quick else Plan(seed=self.seed)
         told = Told.read(plan, out) if self.add else Told()
         wanted = [job for job in plan.select(self.only) if job.name not in told.courses]

@@ -117,10 +117,14 @@ class _Bar:
     """Progress of a training: steps/s, speed, survival, the last verdict and time left."""
 
     def __init__(self, run: "Run") -> None:
-        self.row: Row = {}
+        from gaitshift.training.lines import last
+        from gaitshift.training.run import PROGRESS, VERDICTS
+
+        self.row: Row = last(run.folder / PROGRESS, run.iteration)
         """The last line of progress.csv."""
-        self.verdict: Row = {}
+        self.verdict: Row = last(run.folder / VERDICTS, run.iteration)
         """The last verdict."""
+        self.verdict.pop("iteration", None)
         self._run = run
         console = Console(stderr=True)
         self._progress = Progress(

@@ -79,7 +79,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
         """Starts every episode anew. The same seed gives the same bits ever after."""
-        if seed is not None or not hasattr(self, "_rng"):
+        if seed is not None:
             self._start(np.random.default_rng(seed))
         self._restart(np.arange(self.num_envs))
         return self._observation(), {}

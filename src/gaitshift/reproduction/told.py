@@ -71,7 +71,11 @@ class Told:
         return cls(
             courses=courses,
             broken=frozenset(broken),
-            figures={names[key]: _numbers(row) for key, row in judged.items() if key in names},
+            figures={
+                name: _numbers(judged[key], f"{out / GAITS}, {name}")
+                for key, name in names.items()
+                if key in judged
+            },
         )
 
 
@@ -90,7 +94,10 @@ def _rows(path: Path) -> list[tuple[tuple[str, ...], dict[str, str]]]:
         raise GaitshiftError(f"{path} is damaged: {error}") from error
 
 
-def _numbers(row: Mapping[str, str]) -> dict[str, float | None]:
+def _numbers(row: Mapping[str, str], where: str) -> dict[str, float | None]:
     """What of a line is a number; None where nothing was to be told."""
     names = [name for name in row if name not in (*KEY, "walks_from_iteration")]
-    return {name: float(row[name]) if row[name] else None for name in names}
+    try:
+        return {name: float(row[name]) if row[name] else None for name in names}
+    except (ValueError, TypeError) as error:
+        raise GaitshiftError(f"{where} is damaged: {error}") from error

@@ -9,6 +9,7 @@ from typing import Any
 from gaitshift import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.reproduction.plan import Job
+from gaitshift.training.learner import DivergedError
 from gaitshift.training.run import CHECKPOINTS, CONFIG, POLICY, PROGRESS, Run
 
 FAILED = "failed.txt"
@@ -30,16 +31,15 @@ def is_over(job: Job, folder: Path) -> bool:
 def train(job: Job, folder: Path) -> None:
     """Trains the job in its folder, from its last checkpoint if there is one.
 
-    A run that breaks down (its numbers are no longer finite, say) leaves `failed.txt` and what it
-    learned so far: that is a finding, and breaks no other run.
+    A run whose numbers are no longer finite leaves `failed.txt` and what it learned so far: that is
+    a finding, and breaks no other run. Whatever else ends it (a full disk, say) is raised, and the
+    same call goes on.
     """
+    run = Run.resume(folder) if _started(folder) else _create(job, folder)
     try:
-        run = Run.resume(folder) if _started(folder) else _create(job, folder)
         run.train()
-    except GaitshiftError:
-        raise
-    except (ValueError, ArithmeticError, RuntimeError) as error:
-        (folder / FAILED).write_text(f"{type(error).__name__}: {str(error).splitlines()[0]}\n")
+    except DivergedError as error:
+        (folder / FAILED).write_text(f"{error}\n")
 
 
 def iterations_done(folder: Path) -> int:

@@ -27,6 +27,24 @@ def check(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
     _check_stances({state.name: state for state in states}, edges)
 
 
+def check_lockout(edges: tuple[Edge, ...], dwell: int, dwell_range: tuple[int, int]) -> None:
+    """Refuse dwells that a commanded one, in place of the machine's own, would take away.
+
+    A machine without any lock-out, in which all are 0, is lawful. Raises `GaitshiftError`.
+    """
+    if dwell > 0 and dwell_range[0] == 0:
+        raise GaitshiftError(
+            f"dwell_range must begin at 1 or above where dwell is {dwell}: a command of 0 would"
+            " end the lock-out"
+        )
+    for number, edge in enumerate(edges, start=1):
+        if dwell == 0 and edge.guard.dwell > 0:
+            raise GaitshiftError(
+                f"{_title(number, edge)}: a dwell of {edge.guard.dwell} would be lost, since the"
+                " machine's own is 0; give that 1 or above"
+            )
+
+
 def _check_names(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
     if not states:
         raise GaitshiftError("there is no state; give at least one [[state]]")

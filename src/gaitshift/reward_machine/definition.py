@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 from gaitshift.command import MOST_SPEED, PAPER_SPEED
 from gaitshift.errors import GaitshiftError
 from gaitshift.legs import LEGS, MIRRORED_LEGS
-from gaitshift.reward_machine.check import check
+from gaitshift.reward_machine.check import check, check_lockout
 from gaitshift.reward_machine.cycle import cycle, shares, stride, touchdowns
 from gaitshift.reward_machine.edge import Edge, check_swing_height
 from gaitshift.reward_machine.guard import check_dwell
@@ -62,16 +62,18 @@ class Definition:
     """δu and δr."""
 
     dwell: int
-    """The machine's own dwell [control steps], of every edge that names no other."""
+    """The machine's own dwell [control steps], of every edge that names no other; 0 where no edge
+    has any."""
 
     ideal_phase: tuple[float, float, float, float]
     """Touchdown of each foot in `LEGS` [fraction of the stride, 0 to below 1]: the gait's norm."""
 
     dwell_range: tuple[int, int]
-    """Least and greatest dwell that may be commanded [control steps]: the gait's frequencies."""
+    """Least and greatest dwell that may be commanded [control steps]: the gait's frequencies. The
+    least is 0 where the machine's own is."""
 
     speed: float
-    """Nominal forward speed [m/s]."""
+    """Nominal forward speed [m/s], above 0."""
 
     speed_range: tuple[float, float]
     """Least and greatest forward speed that may be commanded [m/s]."""
@@ -92,10 +94,13 @@ class Definition:
                     f"{name}_range must be two numbers, rising, with {name} = {own:g} in between,"
                     f" not {low:g} to {high:g}"
                 )
+        if self.speed == 0:
+            raise GaitshiftError("speed must be above 0 m/s; its range may begin at 0")
         if not self.speed_range[1] <= MOST_SPEED:
             raise GaitshiftError(f"speed_range must end at {MOST_SPEED:g} m/s or below")
         check_dwell(self.dwell_range[1])
         check(self.states, self.edges)
+        check_lockout(self.edges, self.dwell, self.dwell_range)
 
     @property
     def initial(self) -> int:

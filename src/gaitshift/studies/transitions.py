@@ -90,9 +90,7 @@ class _AtSteps:
     step_of: Int[np.ndarray, " N"]
     gait: str
 
-    def step(
-        self, time: float, motion: Motion, driver: Controller, command: Command
-    ) -> Decision:
+    def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:
         """Changes those that are due in the control step that ends at `time`."""
         now = round(time / CONTROL_PERIOD)
         driver.switch(np.flatnonzero(self.step_of == now), self.gait, motion)

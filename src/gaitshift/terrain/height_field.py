@@ -88,15 +88,6 @@ class Terrain:
         height = near + np.maximum(u, v) * (middle - near) + np.minimum(u, v) * (far - middle)
         return np.asarray(height)
 
-    def normal_at(self, xy: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch 3"]:
-        """Upward unit normal of the surface below points `xy` [m], world frame; as `height_at`."""
-        near, middle, far, u, v = self._triangle(xy)
-        first, second = middle - near, far - middle
-        slope_x = np.where(u < v, second, first) / self.cell[0]
-        slope_y = np.where(u < v, first, second) / self.cell[1]
-        normal = np.stack([-slope_x, -slope_y, np.ones_like(slope_x)], axis=-1)
-        return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-
     def contains(
         self, xy: Float[np.ndarray, "*batch 2"], margin: float = 0.0
     ) -> Bool[np.ndarray, "*batch"]:

@@ -1,6 +1,7 @@
 """rsl_rl's PPO on a `GaitEnv`: one object that collects and learns an iteration at a time."""
 
 from itertools import chain
+from math import isfinite
 from typing import Any, cast
 
 import numpy as np
@@ -12,6 +13,7 @@ from tensordict import TensorDict
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.env import GaitEnv
+from gaitshift.errors import GaitshiftError
 from gaitshift.observation import JOINT_MIRROR
 from gaitshift.training.recipe import Recipe
 
@@ -22,6 +24,10 @@ _GROUPS = {"actor": ["policy"], "critic": ["policy"]}
 def as_tensors(observation: np.ndarray) -> TensorDict:
     """An observation as rsl_rl wants it."""
     return TensorDict({"policy": torch.from_numpy(observation)}, batch_size=[len(observation)])
+
+
+class DivergedError(GaitshiftError):
+    """A training broke down in its own numbers: they are no longer finite."""
 
 
 class Learner:
@@ -41,7 +47,23 @@ class Learner:
         self._observation = as_tensors(observation)
 
     def iterate(self) -> dict[str, float]:
-        """Collects one batch, learns from it, and tells what it saw."""
+        """Collects one batch, learns from it, and tells what it saw.
+
+        Raises:
+            DivergedError: weights, actions or figures are not finite.
+        """
+        try:
+            seen = self._collect_and_update()
+        except (ArithmeticError, RuntimeError, ValueError):
+            self._check_weights()  # torch's own complaint about them is not as plain
+            raise
+        self._check_weights()
+        for name, value in seen.items():
+            if not isfinite(value):
+                raise DivergedError(f"the training broke down: {name} is {value}")
+        return seen
+
+    def _collect_and_update(self) -> dict[str, float]:
         self.ppo.train_mode()
         statistics = _Statistics()
         with torch.inference_mode():
@@ -63,9 +85,19 @@ class Learner:
         self.ppo.entropy_coef = entropy * config.entropy
         self.ppo.gamma = 1.0 - (1.0 - config.discount) / horizon
 
+    def _check_weights(self) -> None:
+        for network, model in (("actor", self.ppo.actor), ("critic", self.ppo.critic)):
+            for name, weights in model.named_parameters():
+                if not weights.isfinite().all():
+                    raise DivergedError(
+                        f"the training broke down: {name} of the {network} is not finite"
+                    )
+
     def _collect(self, statistics: "_Statistics") -> None:
         ppo, scale = self.ppo, self.recipe.ppo.reward_scale
         action = ppo.act(self._observation)
+        if action.isnan().any():
+            raise DivergedError("the training broke down: an action is not a number")
         observation, reward, terminated, truncated, info = self.env.step(action.numpy())
         statistics.add(reward, terminated, truncated, info)
         rewards = torch.from_numpy(scale * reward).float()

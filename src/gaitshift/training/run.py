@@ -25,7 +25,7 @@ from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export
 from gaitshift.training.ground import FIELD, draw_grounds, stage_at
 from gaitshift.training.learner import Learner
-from gaitshift.training.lines import Row, append, trim
+from gaitshift.training.lines import Row, append, last, trim
 from gaitshift.training.recipe import Recipe
 
 CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
@@ -93,8 +93,8 @@ class Run:
                     f"or --resume {folder}"
                 )
             _clear(folder)
+        folder.mkdir(parents=True, exist_ok=True)  # first, since where it fails nothing else helps
         run = cls(folder, machine, recipe, seed, command, robot)
-        folder.mkdir(parents=True, exist_ok=True)
         config = {
             "command": command,
             "seed": seed,
@@ -120,7 +120,7 @@ class Run:
             robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
             use_robot(robot)
             run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
-        except FileNotFoundError as error:
+        except (FileNotFoundError, NotADirectoryError) as error:
             raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
         except (ValueError, KeyError, TypeError) as error:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
@@ -140,13 +140,16 @@ class Run:
     ) -> Path:
         """Runs to the end, calling `report` after each iteration; gives the policy's path.
 
-        At each checkpoint the policy is written out for `judge`, and its verdict written down.
+        At each checkpoint the policy is written out for `judge`, and its verdict written down;
+        first of all that of the present one, if a kill left it out.
         Interrupted by Ctrl-C it leaves the last checkpoint, and the policy as it stands.
         """
         writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
         for name in (PROGRESS, VERDICTS):
             trim(self.folder / name, self.iteration)
         try:
+            if judge is not None and self._lacks_verdict():
+                self._write_verdict(judge)
             while self.iteration < self.recipe.iterations:
                 row = self.iterate()
                 self._log(row, writer)
@@ -249,7 +252,11 @@ class Run:
         state = _read_checkpoint(path)
         self.iteration = state["iteration"]
         self._wall = state["wall_s"]
-        self.learner.ppo.load(state["ppo"], None, True)
+        try:
+            self.learner.ppo.load(state["ppo"], None, True)
+        except (KeyError, RuntimeError, ValueError) as error:
+            why = " ".join(str(error).split())
+            raise GaitshiftError(f"{path} does not fit {self.folder / CONFIG}: {why}") from error
         torch.set_rng_state(state["torch_rng"])
         stage, within = stage_at(self.recipe, self.iteration)
         drawn = within - within % stage.redraw_every
@@ -261,6 +268,11 @@ class Run:
         for name, value in row.items():
             if name not in ("iteration", "stage"):
                 writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
+
+    def _lacks_verdict(self) -> bool:
+        if self.iteration == 0 or not self._is_checkpoint():
+            return False
+        return last(self.folder / VERDICTS, self.iteration).get("iteration") != self.iteration
 
     def _write_verdict(self, judge: Judge) -> None:
         self.export()

@@ -29,12 +29,16 @@ class PushConfig:
 
 
 class Pusher:
-    """Draws the present force on each of N robots, step after step."""
+    """Draws the present force on each of N robots, step after step.
+
+    Every robot has a clock of its own: pushes begin `interval` steps apart, and the first one in a
+    step drawn from the first `interval - duration`, the first step of all among them.
+    """
 
     def __init__(self, config: PushConfig, n: int, rng: np.random.Generator) -> None:
         self.config = config
         self._rng = rng
-        # Every robot starts somewhere in its pause, so that nobody is pushed at step 0.
+        # Every robot starts somewhere in its pause: one in 180 at its end, pushed in step 0.
         self._clock: Int[np.ndarray, " N"] = rng.integers(config.duration, config.interval, size=n)
         self._force_w: Float[np.ndarray, "N 3"] = np.zeros((n, 3))
 
@@ -51,7 +55,7 @@ class Pusher:
         return self._force_w
 
     def clear(self, ids: Int[np.ndarray, " K"]) -> None:
-        """Ends the pushes of robots that start anew, and gives them a fresh pause."""
+        """Ends the pushes of robots that start anew, and sets them somewhere in a pause."""
         self._force_w[ids] = 0.0
         self._clock[ids] = self._rng.integers(
             self.config.duration, self.config.interval, size=len(ids)
