@@ -15,7 +15,7 @@ from onnx import helper
 from gaitshift import gaits, policy
 from gaitshift.env import EnvConfig, GaitEnv
 from gaitshift.errors import GaitshiftError
-from gaitshift.policy import PolicyInfo
+from gaitshift.policy_info import PolicyInfo
 from gaitshift.reward_machine import RewardMachine
 from gaitshift.terrain import flat
 from gaitshift.training.export import describe, export, write

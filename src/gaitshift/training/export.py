@@ -13,7 +13,7 @@ from rsl_rl.modules import EmpiricalNormalization
 
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.env import GaitEnv
-from gaitshift.policy import PolicyInfo
+from gaitshift.policy_info import PolicyInfo
 
 OPSET = 18
 """ONNX operator set; every onnxruntime of the last years reads it."""
