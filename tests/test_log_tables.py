@@ -91,6 +91,36 @@ def test_a_stretch_that_is_too_long_is_cut(tmp_path, monkeypatch):
     assert lengths == [15, 15, 10, 15, 5]
 
 
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@pytest.mark.parametrize("batch", [7, 20, 1000])
+def test_for_the_way_to_flat_ground_a_table_is_cut_where_rough_ground_begins(
+    tmp_path, monkeypatch, ending, batch
+):
+    monkeypatch.setattr(table, "BATCH", batch)
+    monkeypatch.setattr(table, "BLOCK", 300 * batch)
+    read = list(passages(written(tmp_path, columns(), ending), "flat"))
+    assert [len(one.time) for one in read] == [20, 40]
+    assert not read[0].rough.any()
+    assert read[1].rough[:, 0].tolist() == [True] * 20 + [False] * 20
+
+
+def test_a_single_row_at_a_border_is_no_passage(tmp_path):
+    data = columns()
+    data["rough"][:20] = np.arange(20) == 0
+    lengths = [len(one.time) for one in passages(written(tmp_path, data))]
+    assert lengths == [39, 20], "rough in the first row alone"
+
+
+def test_whole_numbers_are_numbers(tmp_path):
+    """Nanoseconds since 1970 pass 2^53, and are no seconds: that is what is said of them."""
+    data = columns() | {"power": 2**60 + np.arange(ROWS)}
+    (first, _) = passages(written(tmp_path, data, "parquet"))
+    assert first.power[0, 0] == 2.0**60
+    data["time"] = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(ROWS)
+    with pytest.raises(GaitshiftError, match="rows are 1e\\+07 apart in 'time'; it is in seconds"):
+        list(passages(written(tmp_path, data, "parquet")))
+
+
 def test_contacts_and_labels_may_be_true_and_false(tmp_path):
     data = columns()
     for name in (*table.CONTACTS, "rough"):
@@ -124,6 +154,17 @@ def at_row(name, row, value):
     return change
 
 
+def gravity(*vector, until=ROWS):
+    """Gravity instead of the angles: this vector, and (0, 0, -1) from a row on."""
+
+    def change(data):
+        del data["roll"], data["pitch"]
+        for axis, value, level in zip("xyz", vector, (0.0, 0.0, -1.0), strict=True):
+            data[f"gravity_{axis}"] = np.where(np.arange(ROWS) < until, value, level)
+
+    return change
+
+
 def all_of(names, value):
     def change(data):
         for name in names:
@@ -150,6 +191,11 @@ def all_of(names, value):
             "row 60 comes 0.12 s after the one before, the first ones 0.01 s",
         ),
         (all_of([f"contact_{leg}" for leg in LEGS], 0), "no foot ever touches"),
+        (gravity(0.0, 0.0, 0.0, until=2), "row 1, gravity_x, _y, _z are 0 and point nowhere"),
+        (gravity(0.3, 0.1, 9.7), "by gravity_x, gravity_y, gravity_z gravity points up on average"),
+        (all_of(["roll"], 3.1), "by roll, pitch gravity points up on average"),
+        (lambda data: data.update(time=10 * np.arange(ROWS)), "rows are 10 apart in 'time'; it is"),
+        (lambda data: data.update(time=1e-5 * np.arange(ROWS)), "0.0005 to 0.5 s would be right"),
     ],
 )
 def test_a_faulty_table_is_named_with_its_row_or_column(tmp_path, change, message):
@@ -180,6 +226,30 @@ def test_a_file_that_is_none_is_named(tmp_path, name, content, message):
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(GaitshiftError, match=message):
+        list(passages(path))
+
+
+def test_a_table_of_one_row_is_refused(tmp_path):
+    data = {name: values[:1] for name, values in columns().items()}
+    with pytest.raises(GaitshiftError, match=r"walk\.csv: there is one row alone in it; a row a"):
+        list(passages(written(tmp_path, data)))
+
+
+def test_a_table_in_another_encoding_is_named(tmp_path):
+    path = written(tmp_path, columns() | {"größe": np.arange(ROWS)})
+    path.write_bytes(path.read_text(encoding="utf-8").encode("latin-1"))
+    with pytest.raises(GaitshiftError, match=r"walk\.csv is not written in UTF-8") as caught:
+        list(passages(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_cannot_be_opened_is_named(tmp_path, monkeypatch):
+    def refused(*args, **options):
+        raise PermissionError("not for you")
+
+    path = written(tmp_path, columns())
+    monkeypatch.setattr("pyarrow.csv.open_csv", refused)
+    with pytest.raises(GaitshiftError, match=r"walk\.csv cannot be read as csv: not for you"):
         list(passages(path))
 
 

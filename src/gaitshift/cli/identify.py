@@ -14,6 +14,7 @@ from gaitshift.errors import GaitshiftError
 
 if TYPE_CHECKING:
     from gaitshift.identification.finding import Judged, Recordings
+    from gaitshift.identification.recording import Way
 
 ROC, PAGE = "roc.png", "page.html"
 
@@ -75,8 +76,9 @@ class Identify:
         named = candidates([name for name in self.condition if name not in (NAME, "all")])
         wanted = list(CANDIDATES if everything else named)
         check_sources((*self.logs, *self.held_out))
+        _check_apart(self.logs, self.held_out)
         check_folder(self.out, overwrite=self.overwrite, ours=(*reports.FILES, ROC, PAGE))
-        read = _reader(self.logs)
+        read = _reader(self.logs, self.way)
         classifier: RoughnessClassifier | None = None
         if everything or NAME in self.condition:
             say("fitting the classifier")
@@ -92,14 +94,18 @@ class Identify:
         else:
             leak = self.leak or 0.0
             tuned = as_given(wanted, way=self.way, alpha=self.alpha, beta=self.beta, leak=leak)
-        missing = {c.name for c in wanted} - {t.candidate.name for t in tuned}
-        if missing and not everything:
-            raise GaitshiftError(f"the logs lack the signals of '{min(missing)}'")
+        found = {one.candidate.name for one in tuned}
+        left_out = [candidate for candidate in wanted if candidate.name not in found]
+        if left_out and not everything:
+            lacks = left_out[0].missing(next(iter(read())))
+            raise GaitshiftError(
+                f"the logs lack the signals of '{left_out[0].name}': it needs {', '.join(lacks)}"
+            )
         if classifier is not None:
             known = classifier.candidate(crosswise=False)
             tuned = [replace(t, candidate=known) if t.candidate.name == NAME else t for t in tuned]
         judges = self.held_out or self.logs
-        judged = judge(tuned, _reader(judges), report=_tell("judging"))
+        judged = judge(tuned, _reader(judges, self.way), report=_tell("judging"))
         self.out.mkdir(parents=True, exist_ok=True)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         rows = reports.write_report(
@@ -121,10 +127,21 @@ class Identify:
             emit_table(f"conditions, by {len(judges)} logs; report in {self.out}", cells)
 
 
-def _reader(paths: Sequence[Path]) -> "Recordings":
+def _reader(paths: Sequence[Path], way: "Way") -> "Recordings":
     from gaitshift.identification.sources import recordings
 
-    return lambda: recordings(paths)
+    return lambda: recordings(paths, way)
+
+
+def _check_apart(logs: Sequence[Path], held_out: Sequence[Path]) -> None:
+    """Refuses a log that both chooses and judges, by whatever name."""
+    choosing = {path.resolve() for path in logs}
+    both = [path for path in held_out if path.resolve() in choosing]
+    if both:
+        raise GaitshiftError(
+            f"{both[0]} is given twice, to choose the numbers and with --held-out; logs of other "
+            "seeds would be right"
+        )
 
 
 def _tell(what: str) -> Callable[[str], None]:
@@ -136,6 +153,7 @@ def _tell(what: str) -> Callable[[str], None]:
 
 def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
     """Draws the pictures into `out`: a line on each, by its file."""
+    from gaitshift.identification.report import hardest_first
     from gaitshift.plots.identification import condition_map, roc_figure
 
     pictures: dict[str, str] = {}
@@ -143,16 +161,10 @@ def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
         if one.tuned.choice.is_free is None:
             continue  # nothing was tried but the numbers that were given
         name = one.tuned.candidate.name
-        condition_map(one.tuned, out / f"{name}.png")
+        condition_map(one, out / f"{name}.png")
         pictures[f"{name}.png"] = f"How soon {name} notices, over α and β"
-    met = [c.course for c in judged[0].courses if judged[0].area(c.course) is not None]
+    met = hardest_first(judged)
     if met:
-        hardest = min(met, key=lambda course: _area(judged[0], course))
-        roc_figure(judged, hardest, out / ROC)
-        pictures[ROC] = f"ROC curves on {hardest}"
+        roc_figure(judged, met[0], out / ROC)
+        pictures[ROC] = f"ROC curves on {met[0]}"
     return pictures
-
-
-def _area(one: "Judged", course: str) -> float:
-    area = one.area(course)
-    return 1.0 if area is None else area[0]

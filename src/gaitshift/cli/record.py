@@ -1,5 +1,6 @@
 """`gaitshift record`: logs of the standard courses, for `gaitshift identify`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,8 +11,10 @@ import tyro
 from gaitshift import policy as policies
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation.courses import run_course, select
+from gaitshift.evaluation import EvaluationConfig, RolloutConfig
+from gaitshift.evaluation.courses import Course, run_course, select
 from gaitshift.log import Log
+from gaitshift.policy import Policy
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,29 +46,38 @@ class Record:
         """Records, and tells what there is."""
         if not self.policies:
             raise GaitshiftError(f"which gaits? give some of {', '.join(policies.shipped())}")
+        _ = EvaluationConfig(episodes=self.robots, seconds=self.seconds, seed=self.seed)
         loaded = [policies.load(name) for name in self.policies]
         chosen = select(self.courses)
         if self.out.exists() and not self.out.is_dir():
             raise GaitshiftError(f"{self.out} is a file; give a folder with --out")
+        gaits = [policy.gait for policy in loaded]
+        twice = [gait for gait in gaits if gaits.count(gait) > 1]
+        if twice:
+            raise GaitshiftError(
+                f"two of the policies are of the gait '{twice[0]}', and would write the same logs; "
+                "record them one by one, each with an --out of its own"
+            )
+        kept = self._kept([(policy, course) for policy in loaded for course in chosen])
         self.out.mkdir(parents=True, exist_ok=True)
         rows: list[dict[str, Any]] = []
         for policy in loaded:
             for course in chosen:
-                path = self.out / f"{policy.gait}-{course.name}-{self.seed}.npz"
-                if path.exists() and not self.overwrite:
+                path = self._path(policy, course)
+                if path in kept:
                     say(f"{path} is there already, and kept")
-                    log = Log.load(path)
-                else:
-                    with progress(f"{policy.gait}, {course.name}") as report:
-                        log = run_course(
-                            policy,
-                            course,
-                            robots=self.robots,
-                            seconds=self.seconds,
-                            seed=self.seed,
-                            report=report,
-                        )
-                    log.save(path)
+                    rows.append(kept[path])
+                    continue
+                with progress(f"{policy.gait}, {course.name}") as report:
+                    log = run_course(
+                        policy,
+                        course,
+                        robots=self.robots,
+                        seconds=self.seconds,
+                        seed=self.seed,
+                        report=report,
+                    )
+                log.save(path)
                 rows.append(_row(path, log))
         if self.json:
             emit_json({"logs": rows})
@@ -75,6 +87,32 @@ class Record:
                 for r in rows
             ]
             emit_table(f"logs in {self.out}", table)
+
+    def _path(self, policy: Policy, course: Course) -> Path:
+        return self.out / f"{policy.gait}-{course.name}-{self.seed}.npz"
+
+    def _kept(self, asked: Sequence[tuple[Policy, Course]]) -> dict[Path, dict[str, Any]]:
+        """What is told of the logs that are there already, each as long and of as many as asked.
+
+        Raises:
+            GaitshiftError: one holds something else.
+        """
+        kept: dict[Path, dict[str, Any]] = {}
+        steps = RolloutConfig(seconds=self.seconds).steps
+        for policy, course in asked:
+            path = self._path(policy, course)
+            if self.overwrite or not path.exists():
+                continue
+            log = Log.load(path)
+            length, robots = log.fallen.shape
+            whole = length == steps or (length < steps and bool(log.fallen[-1].all()))
+            if not whole or robots != self.robots:
+                raise GaitshiftError(
+                    f"{path} is there already and holds {robots} robots × {log.time[-1]:g} s, not "
+                    f"{self.robots} × {self.seconds:g} s; ask for the same, or --overwrite"
+                )
+            kept[path] = _row(path, log)
+        return kept
 
 
 def _row(path: Path, log: Log) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification.recording import Recording
+from gaitshift.identification.table import columns_of
 from gaitshift.switching import (
     AnyStatistic,
     AttitudeVariance,
@@ -55,9 +56,10 @@ class Candidate:
         """α that are tried."""
         return np.geomspace(self.low, self.high, _ALPHAS)
 
-    def is_fed_by(self, recording: Recording) -> bool:
-        """Whether the recording has all signals that it looks at."""
-        return all(getattr(recording, name) is not None for name in self.needs)
+    def missing(self, recording: Recording) -> tuple[str, ...]:
+        """Columns of a table that the recording's log lacks, and that it looks at."""
+        signals = (name for name in self.needs if getattr(recording, name) is None)
+        return tuple(column for name in signals for column in columns_of(name))
 
 
 def _watching(statistic: AnyStatistic, name: str, **settings: Any) -> Candidate:
@@ -157,7 +159,7 @@ CANDIDATES = (
 
 
 def candidates(names: Sequence[str]) -> tuple[Candidate, ...]:
-    """The candidates of these names.
+    """The candidates of these names, each once.
 
     Raises:
         GaitshiftError: no such candidate.
@@ -167,4 +169,4 @@ def candidates(names: Sequence[str]) -> tuple[Candidate, ...]:
     if unknown:
         listed = ", ".join((*known, "classifier"))
         raise GaitshiftError(f"no condition '{unknown[0]}'; known: {listed}, or all")
-    return tuple(known[name] for name in names)
+    return tuple(known[name] for name in dict.fromkeys(names))

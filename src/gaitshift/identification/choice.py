@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +15,8 @@ HEADROOM = 1.25
 chosen at the very edge fails on the next recordings."""
 
 ALPHA_HEADROOM = 1.05
-"""… and at an α smaller by this one, which is all the headroom there is where β is 0; ours."""
+"""… and at an α by this factor further to where a rule fires more: smaller where it counts what is
+above α, larger where it counts what is below. All the headroom there is where β is 0; ours."""
 
 MISS_COSTS = 20.0
 """A rough stretch that went by without a shift counts as a delay of this many metres; ours."""
@@ -39,7 +41,11 @@ class Choice:
     None where the numbers were given."""
 
 
-def choose(tallies: Mapping[float, Mapping[str, Tally]], grid: Grid) -> Choice:
+def choose(
+    tallies: Mapping[float, Mapping[str, Tally]],
+    grid: Grid,
+    when: Literal["above", "below"] = "above",
+) -> Choice:
     """The soonest detection of rough ground among the settings that never shift on smooth ground.
 
     Where there is none, those with the fewest false shifts a kilometre are taken.
@@ -47,22 +53,28 @@ def choose(tallies: Mapping[float, Mapping[str, Tally]], grid: Grid) -> Choice:
     Args:
         tallies: by leak, then by the name of the recordings.
         grid: the α and β that they are about.
+        when: what the rule counts; "below" is for the way back, on which rough and smooth ground
+            have changed their parts.
 
     Raises:
         GaitshiftError: no robot came to rough ground, or none walked on smooth ground.
     """
-    choices = [_best(leak, _together(by_name), grid) for leak, by_name in tallies.items()]
+    choices = [_best(leak, _together(by_name), grid, when) for leak, by_name in tallies.items()]
     return min(choices, key=lambda c: (not c.is_free, 0 if c.is_free else c.false_per_km, c.cost_m))
 
 
-def _best(leak: float, tally: Tally, grid: Grid) -> Choice:
+def _best(leak: float, tally: Tally, grid: Grid, when: Literal["above", "below"]) -> Choice:
+    back = when == "below"
     if not tally.came.any():
-        raise GaitshiftError("no rough ground in the recordings: nothing to detect")
+        ground = "rough ground that ends" if back else "rough ground"
+        raise GaitshiftError(f"no {ground} in the recordings: nothing to detect")
     if not tally.km.any():
-        raise GaitshiftError("no smooth ground in the recordings: nothing to keep still on")
+        ground = "rough" if back else "smooth"
+        raise GaitshiftError(f"no {ground} ground in the recordings: nothing to keep still on")
     cost = _cost(tally)
-    free = _free(tally, grid)
-    allowed = free if free.any() else tally.fired == tally.fired.min()
+    free = _free(tally, grid, when)
+    rate = tally.false_per_km
+    allowed = free if free.any() else rate == np.nanmin(rate)
     a, b = np.unravel_index(np.where(allowed, cost, np.inf).argmin(), grid.shape)
     return Choice(
         alpha=float(grid.alphas[a]),
@@ -91,10 +103,14 @@ def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
     return np.where(tally.came > 0, total / np.maximum(tally.came, 1), np.inf)
 
 
-def _free(tally: Tally, grid: Grid) -> np.ndarray:
-    """Where nobody fired on smooth ground, nor at an α and β that much smaller."""
+def _free(tally: Tally, grid: Grid, when: Literal["above", "below"]) -> np.ndarray:
+    """Where nobody fired on smooth ground, nor at a β that much smaller and an α as much nearer."""
     clean = tally.fired == 0
-    alpha = np.searchsorted(grid.alphas, grid.alphas / ALPHA_HEADROOM, "right") - 1
+    if when == "above":
+        alpha = np.searchsorted(grid.alphas, grid.alphas / ALPHA_HEADROOM, "right") - 1
+    else:
+        alpha = np.searchsorted(grid.alphas, grid.alphas * ALPHA_HEADROOM, "left")
     beta = np.searchsorted(grid.betas, grid.betas / HEADROOM, "right") - 1
-    known = (alpha >= 0)[:, None] & (beta >= 0)
-    return clean & known & clean[np.maximum(alpha, 0)][:, np.maximum(beta, 0)]
+    last = len(grid.alphas) - 1
+    known = ((alpha >= 0) & (alpha <= last))[:, None] & (beta >= 0)
+    return clean & known & clean[np.clip(alpha, 0, last)][:, np.maximum(beta, 0)]

@@ -2,24 +2,28 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification.candidates import BETAS, Candidate
+from gaitshift.identification.chatter import chattered, shifts, shipped_rule, shipped_values
 from gaitshift.identification.choice import Choice, choose
+from gaitshift.identification.facing import facing
 from gaitshift.identification.grid import first_firings, steps_alive
-from gaitshift.identification.passage import passage_scores
-from gaitshift.identification.recording import Recording
+from gaitshift.identification.passage import (
+    GridScores,
+    best_beta,
+    longest_passage,
+    passage_grid,
+    passage_scores,
+)
+from gaitshift.identification.recording import Recording, Way
 from gaitshift.identification.scores import detections
 from gaitshift.identification.statistics import auc, auc_interval
 from gaitshift.identification.tally import Grid, Tally
 from gaitshift.switching import Rule
-
-Way = Literal["rough", "flat"]
-"""What is to be noticed: rough ground ahead, or, on the way back, that it has ended."""
 
 Recordings = Callable[[], Iterable[Recording]]
 """Gives the recordings, one after the other, as often as asked."""
@@ -39,11 +43,20 @@ class Tuned:
     """What was tried."""
     tally: Tally
     """What came of it over the recordings that chose, at the chosen leak."""
+    area_beta: float
+    """β at which passages are scored for ROC curves [counts]: of the grid's the one of the largest
+    mean area on the recordings that chose, as k may not reach the chosen β within a passage; where
+    numbers were given, the one that was given."""
 
     @property
     def rule(self) -> Rule:
         """The rule that was chosen."""
         return _rule(self.way, self.choice.alpha, self.choice.beta, self.choice.leak)
+
+    @property
+    def area_rule(self) -> Rule:
+        """The rule by which passages are scored."""
+        return replace(self.rule, beta=self.area_beta)
 
 
 @dataclass(kw_only=True)
@@ -58,6 +71,10 @@ class OnCourse:
     """Of each detection [m]."""
     scores: dict[bool, list[int]] = field(default_factory=lambda: {True: [], False: []})
     """Score of each passage (`passage_scores`), of what is to be noticed and of what is not."""
+    shifts: int = 0
+    """How often robots would have shifted, there and back (`chatter`)."""
+    chattered: int = 0
+    """Robots that did so more than once there and once back for each rough stretch."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,14 +89,17 @@ class Judged:
     """What β is in time [s]: from k = 0 to firing where every value counts in each step."""
     speed: float
     """Mean speed of the robots that judged [m/s]."""
+    is_scored: bool
+    """Whether k can exceed `Tuned.area_beta` within a passage: else its scores tell nothing."""
 
     def area(self, course: str) -> tuple[float, float, float] | None:
         """Area under the ROC curve of the passages to be noticed on a course, with its interval.
 
-        Against the passages of all recordings on which nothing is to be noticed; None without both.
+        Against the passages of all recordings on which nothing is to be noticed; None without both,
+        and where no passage is long enough for the rule to fire at all.
         """
         wanted, others = self.scores_on(course), self.other_scores
-        if not wanted.size or not others.size:
+        if not self.is_scored or not wanted.size or not others.size:
             return None
         area = float(auc(wanted[:, None], others[:, None])[0])
         low, high = auc_interval(area, len(wanted), len(others))
@@ -111,13 +131,16 @@ def tune(
         GaitshiftError: no rough ground, or no smooth ground, in the recordings.
     """
     tallies: dict[str, dict[float, dict[str, Tally]]] = {}
+    scores: dict[str, dict[float, dict[str, GridScores]]] = {}
+    lacking: dict[str, tuple[str, ...]] = {}
     for recording in recordings():
         report(recording.name)
-        seen = _facing(recording, way)
         for candidate in candidates:
-            if not candidate.is_fed_by(seen):
+            if missing := candidate.missing(recording):
+                lacking[candidate.name] = missing
                 continue
             values = candidate.values(recording)  # an oracle sees the ground as it is
+            seen, values = facing(recording, values, way)
             grid = Grid(alphas=candidate.alphas, betas=BETAS)
             for leak in candidate.leaks:
                 rule = _rule(way, 1.0, 1.0, leak)
@@ -125,18 +148,37 @@ def tune(
                 by_name = tallies.setdefault(candidate.name, {}).setdefault(leak, {})
                 tally = by_name.setdefault(seen.name, Tally(shape=grid.shape))
                 tally.add(seen, first)
+                of = passage_grid(seen, values, rule, grid.alphas, grid.betas)
+                kept = scores.setdefault(candidate.name, {}).setdefault(leak, {})
+                course = kept.setdefault(seen.name, {True: [], False: []})
+                for is_wanted, rows in of.items():
+                    course[is_wanted] += rows
     found: list[Tuned] = []
     for candidate in candidates:
         if candidate.name not in tallies:
             continue
         grid = Grid(alphas=candidate.alphas, betas=BETAS)
-        choice = choose(tallies[candidate.name], grid)
+        choice = choose(tallies[candidate.name], grid, _rule(way, 1.0, 1.0, 0.0).when)
         whole = Tally(shape=grid.shape)
         for tally in tallies[candidate.name][choice.leak].values():
             whole.join(tally)
-        found.append(Tuned(candidate=candidate, way=way, choice=choice, grid=grid, tally=whole))
+        found.append(
+            Tuned(
+                candidate=candidate,
+                way=way,
+                choice=choice,
+                grid=grid,
+                tally=whole,
+                area_beta=best_beta(scores[candidate.name][choice.leak], grid.betas, choice.beta),
+            )
+        )
     if not found:
-        raise GaitshiftError("the logs lack the signals of every condition that was asked for")
+        needs = "; ".join(f"'{name}' needs {', '.join(of)}" for name, of in lacking.items())
+        raise GaitshiftError(
+            f"the logs lack the signals of every condition that was asked for: {needs}"
+            if needs
+            else "no recordings to choose by"
+        )
     return found
 
 
@@ -157,6 +199,7 @@ def as_given(
             choice=Choice(alpha=alpha, beta=beta, leak=leak),
             grid=grid,
             tally=Tally(shape=grid.shape),
+            area_beta=beta,
         )
         for candidate, grid in zip(candidates, grids, strict=True)
     ]
@@ -168,53 +211,70 @@ def judge(
     *,
     report: Callable[[str], None] = lambda name: None,
 ) -> list[Judged]:
-    """What conditions with their numbers do on recordings, course by course."""
+    """What conditions with their numbers do on recordings, course by course.
+
+    Raises:
+        GaitshiftError: a recording lacks the signals of a condition, or there is none.
+    """
     courses: dict[str, dict[str, OnCourse]] = {one.candidate.name: {} for one in tuned}
     soonest: dict[str, float] = {}
+    scored: dict[str, bool] = {}
     way, time = 0.0, 0.0
     for recording in recordings():
         report(recording.name)
         steps = steps_alive(recording.alive)
         way += float(recording.distance[steps - 1, np.arange(recording.robots)].sum())
         time += float(steps.sum()) * recording.period
+        other: dict[bool, np.ndarray] = {}
         for one in tuned:
-            seen = _facing(recording, one.way)
-            if not one.candidate.is_fed_by(seen):
+            name, rule, back = one.candidate.name, one.rule, one.way == "flat"
+            if missing := one.candidate.missing(recording):
                 raise GaitshiftError(
-                    f"{seen.name} lacks signals of '{one.candidate.name}' that other logs have"
+                    f"{recording.name} lacks signals of '{name}': it needs {', '.join(missing)}"
                 )
-            alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
             values = one.candidate.values(recording)
-            first = first_firings(values, seen.alive, one.rule, alpha, beta)
-            soonest[one.candidate.name] = one.rule.soonest(values.shape[2], recording.period)
-            kept = courses[one.candidate.name]
-            course = kept.setdefault(
+            if back not in other:
+                other[back] = shipped_values(recording, back=not back)
+            seen, faced = facing(recording, values, one.way)
+            course = courses[name].setdefault(
                 seen.name, OnCourse(course=seen.name, tally=Tally(shape=(1, 1)))
             )
-            course.tally.add(seen, first)
-            delays = detections(seen, first).delay_m.ravel()
-            course.delays_m += delays[~np.isnan(delays)].tolist()
-            scores = passage_scores(seen, values, one.rule, one.grid.alphas)
-            for is_wanted, of in scores.items():
-                course.scores[is_wanted] += of
+            _add(course, one, seen, faced)
+            pair = [(rule, values), (shipped_rule(back=not back), other[back])]
+            there, home = reversed(pair) if back else pair
+            count = shifts(there, home, recording.alive)
+            course.shifts += int(count.sum())
+            course.chattered += int(chattered(recording, count).sum())
+            width, period = values.shape[2], recording.period
+            soonest[name] = rule.soonest(width, period)
+            least = one.area_rule.soonest(width, period)
+            enough = least < period * (longest_passage(seen) + 0.5)
+            scored[name] = scored.get(name, False) or enough
+    if not time:
+        raise GaitshiftError("no recordings to judge by")
     return [
         Judged(
             tuned=one,
             courses=tuple(courses[one.candidate.name].values()),
             soonest=soonest[one.candidate.name],
             speed=way / time,
+            is_scored=scored[one.candidate.name],
         )
         for one in tuned
     ]
 
 
+def _add(course: OnCourse, one: Tuned, seen: Recording, values: Float[np.ndarray, "T N M"]) -> None:
+    """Takes in how a condition did on a recording that shows what it is to notice (`facing`)."""
+    alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
+    first = first_firings(values, seen.alive, one.rule, alpha, beta)
+    course.tally.add(seen, first)
+    delays = detections(seen, first).delay_m.ravel()
+    course.delays_m += delays[~np.isnan(delays)].tolist()
+    for is_wanted, of in passage_scores(seen, values, one.area_rule, one.grid.alphas).items():
+        course.scores[is_wanted] += of
+
+
 def _rule(way: Way, alpha: float, beta: float, leak: float) -> Rule:
     when = "above" if way == "rough" else "below"
     return Rule(when=when, alpha=alpha, beta=beta, leak=leak)
-
-
-def _facing(recording: Recording, way: Way) -> Recording:
-    """The recording with what is to be noticed as its rough ground."""
-    if way == "rough":
-        return recording
-    return replace(recording, rough=~recording.rough)

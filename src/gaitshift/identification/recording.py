@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -10,6 +10,9 @@ from jaxtyping import Bool, Float
 from gaitshift.log import Log
 from gaitshift.motion import rotation_of
 from gaitshift.switching import AnyStatistic, Signals
+
+Way = Literal["rough", "flat"]
+"""What is to be noticed: rough ground ahead, or, on the way back, that it has ended."""
 
 _PER_STEP = (
     "yaw",

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from gaitshift.command import CONTROL_PERIOD
+from gaitshift.identification.chatter import SHIPPED, shipped_rule
+from gaitshift.identification.choice import Choice
 from gaitshift.identification.finding import Judged, OnCourse
 from gaitshift.identification.passage import LENGTH
 from gaitshift.identification.statistics import poisson, wilson
@@ -56,6 +58,16 @@ def write_report(
     return conditions
 
 
+def hardest_first(judged: Sequence[Judged]) -> list[str]:
+    """Courses with ROC curves, by the areas of the first condition that has any."""
+    for one in judged:
+        areas = {course.course: one.area(course.course) for course in one.courses}
+        met = sorted((area[0], course) for course, area in areas.items() if area is not None)
+        if met:
+            return [course for _, course in met]
+    return []
+
+
 def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
     """Heading of a report, and how its numbers were chosen and judged."""
     tuned = judged[0].tuned
@@ -68,13 +80,28 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
         "Each condition was replayed at the numbers that were given."
         if tuned.choice.is_free is None
         else "Each condition was replayed over α, β and leaks; chosen was the soonest that never "
-        f"shifts where it should not, even at a β smaller by a quarter. {who}"
+        f"shifts where it should not, even at a β smaller by a fifth. {who}"
     )
+    stand_in = shipped_rule(back=tuned.way == "rough")
+    other = "back" if tuned.way == "rough" else "there"
     return _TITLES[tuned.way], (
         f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. β in "
         "time and way: until k exceeds it where all values lie beyond α, at the robots' mean "
-        f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course. "
-        "Intervals are of 95 %."
+        f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course, at "
+        f"{_area_words(tuned.choice)}. Chattered: robots that would have shifted more than once "
+        f"there and once back for each rough stretch, had they taken the shipped way {other} "
+        f"({SHIPPED}'s: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak {stand_in.leak:g}); the "
+        "gait of the logs stayed. Intervals are of 95 %."
+    )
+
+
+def _area_words(choice: Choice) -> str:
+    """The β of the areas, and why it is another."""
+    if choice.is_free is None:
+        return "the β that was given; none where k cannot exceed it within a passage"
+    return (
+        "the β that told passages apart best on the logs that chose, as k may not reach the chosen "
+        "one within a passage"
     )
 
 
@@ -103,7 +130,11 @@ def _condition_row(one: Judged) -> Row:
         "delay_m": float(np.mean(delays)) if delays else None,
         "false_shifts": fired,
         "km": km,
+        "robots": sum(tally.robots for tally in tallies),
+        "shifts": sum(course.shifts for course in one.courses),
+        "chattered": sum(course.chattered for course in one.courses),
         "area": min(area for area, _, _ in areas) if areas else None,
+        "area_beta": tuned.area_beta if areas else None,
     }
 
 
@@ -133,9 +164,12 @@ def _course_row(one: Judged, course: OnCourse) -> Row:
         "false_per_km": fired / km if km else None,
         "false_per_km_low": float(least) if km else None,
         "false_per_km_high": float(most) if km else None,
+        "shifts": course.shifts,
+        "chattered": course.chattered,
         "area": None if area is None else area[0],
         "area_low": None if area is None else area[1],
         "area_high": None if area is None else area[2],
+        "area_beta": None if area is None else one.tuned.area_beta,
     }
 
 
@@ -157,7 +191,7 @@ def _readme(
     parts.append(_table(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
     parts += [
         f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "
-        "chose: the one with the fewest false shifts was taken."
+        "chose: the one with the fewest false shifts a kilometre was taken."
         for one in judged
         if one.tuned.choice.is_free is False
     ]
@@ -172,7 +206,7 @@ def _readme(
 
 CONDITIONS_HEAD = (
     *("condition", "α", "β", "β [s]", "β [m]", "leak"),
-    *("noticed", "mean delay [m]", "false shifts", "area"),
+    *("noticed", "mean delay [m]", "false shifts", "chattered", "area", "at β"),
 )
 """Above the cells of `condition_cells`."""
 
@@ -189,13 +223,15 @@ def condition_cells(row: Row) -> tuple[str, ...]:
         f"{row['detected']} of {row['came']}",
         _number(row["delay_m"], 2),
         f"{row['false_shifts']} in {row['km']:.2f} km",
-        _number(row["area"], 4),
+        f"{row['chattered']} of {row['robots']}",
+        _number(row["area"], 4) or "–",
+        "–" if row["area_beta"] is None else f"{row['area_beta']:g}",
     )
 
 
 COURSES_HEAD = (
     *("course", "noticed", "delay [m]", "95 % within [m]", "delay [s]"),
-    *("false shifts", "a km, 95 %", "area"),
+    *("false shifts", "a km, 95 %", "chattered", "area", "at β"),
 )
 """Above the cells of `course_cells`."""
 
@@ -211,9 +247,11 @@ def course_cells(row: Row) -> tuple[str, ...]:
         _number(row["delay_s"], 2),
         f"{row['false_shifts']} in {row['km']:.2f} km" if row["km"] else "",
         f"{low:.2g} to {high:.2g}" if row["km"] else "",
-        ""
+        f"{row['chattered']} of {row['robots']}",
+        ("–" if row["came"] else "")
         if row["area"] is None
         else f"{row['area']:.4f} ({row['area_low']:.3f} to {row['area_high']:.3f})",
+        "" if row["area_beta"] is None else f"{row['area_beta']:g}",
     )
 
 

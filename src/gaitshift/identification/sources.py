@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification.labels import rough_ground
-from gaitshift.identification.recording import Recording
+from gaitshift.identification.recording import Recording, Way
 from gaitshift.identification.table import passages
 from gaitshift.log import Log
 
@@ -27,8 +27,8 @@ def check_sources(paths: Sequence[Path]) -> None:
             )
 
 
-def recordings(paths: Sequence[Path]) -> Iterator[Recording]:
-    """What the files hold, one after the other, tables passage by passage.
+def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[Recording]:
+    """What the files hold, one after the other, tables passage by passage for this way.
 
     A recording has the name of its file, less a seed at its end.
 
@@ -37,7 +37,11 @@ def recordings(paths: Sequence[Path]) -> Iterator[Recording]:
     """
     for path in paths:
         if path.suffix in TABLES:
-            yield from passages(path)
+            yield from passages(path, way)
             continue
         log = Log.load(path)
+        if not log.contact.any():
+            raise GaitshiftError(
+                f"{path}: no foot ever touches; 'contact' is true where one is down"
+            )
         yield Recording.from_log(log, _SEED.sub("", path.stem), rough_ground(log))

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.identification.recording import Recording
+from gaitshift.identification.recording import Recording, Way
 from gaitshift.legs import LEGS
+from gaitshift.log import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
 from gaitshift.switching import LegOdometry
 
 _AXES = ("x", "y", "z")
@@ -34,8 +35,8 @@ BATCH, BLOCK = 65_536, 1 << 24
 LONGEST = 60_000
 """Rows of a passage; a longer stretch is cut."""
 
-RATE_TOLERANCE = 0.05
-"""By how much of a period two rows may be nearer or further apart than the first two."""
+_LEAST_GRAVITY = 1e-6
+"""Length below which a vector of gravity has no direction, in whatever unit it is."""
 
 _KNOWN = (
     *REQUIRED,
@@ -45,33 +46,43 @@ _KNOWN = (
 )
 
 
-def passages(path: Path) -> Iterator[Recording]:
+def columns_of(signal: str) -> tuple[str, ...]:
+    """Columns that an optional signal is read from."""
+    prefix = VECTORS.get(signal)
+    return (signal,) if prefix is None else tuple(f"{prefix}_{axis}" for axis in _AXES)
+
+
+def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
     """The passages of a log: smooth ground up to where it ends, and the rough ground behind it.
 
-    A file is read batch by batch, so that gigabytes need no more memory than a passage.
+    On the way to flat ground it is rough ground, and the smooth ground behind it. A file is read
+    batch by batch, so that gigabytes need no more memory than a passage.
 
     Raises:
         GaitshiftError: what the file lacks or has wrong, with the row where there is one.
     """
     columns: dict[str, list[np.ndarray]] = {}
-    rows, before, period, touched = 0, np.nan, np.nan, False
+    rows, before, period, touched, down = 0, np.nan, np.nan, False, 0.0
     for batch in _batches(path):
         _check_columns(path, batch)
         period = _check_values(path, batch, rows, before, period)
         before = float(batch["time"][-1])
+        down += _down(path, batch, rows, down)
         touched = touched or any(batch[name].any() for name in CONTACTS)
         rows += len(batch["time"])
         for name, values in batch.items():
             columns.setdefault(name, []).append(values)
         whole = {name: np.concatenate(parts) for name, parts in columns.items()}
-        ends = _ends(whole["rough"] > 0.5)
+        rough = whole["rough"] > 0.5
         start = 0
-        for end in ends:
-            yield _recording(path, whole, slice(start, end))
+        for end in _ends(rough if way == "rough" else ~rough):
+            if end - start > 1:
+                yield _recording(path, whole, slice(start, end))
             start = end
         columns = {name: [values[start:]] for name, values in whole.items()}
-    if rows == 0:
-        raise GaitshiftError(f"{path}: there are no rows in it")
+    if rows < 2:
+        there = "there are no rows" if rows == 0 else "there is one row alone"
+        raise GaitshiftError(f"{path}: {there} in it; a row a control step would be right")
     if not touched:
         raise GaitshiftError(f"{path}: no foot ever touches; contacts are 1 where a foot is down")
     whole = {name: np.concatenate(parts) for name, parts in columns.items()}
@@ -101,8 +112,10 @@ def _batches(path: Path) -> Iterator[dict[str, np.ndarray]]:
             with from_csv.open_csv(path, read_options=read, convert_options=convert) as file:
                 for batch in file:
                     yield _arrays(path, batch)
-    except arrow.ArrowInvalid as error:
-        line = str(error).splitlines()[0]
+    except UnicodeError as error:
+        raise GaitshiftError(f"{path} is not written in UTF-8: {error}") from error
+    except (arrow.ArrowException, OSError) as error:
+        line = (str(error).splitlines() or [type(error).__name__])[0]
         raise GaitshiftError(f"{path} cannot be read as {path.suffix[1:]}: {line}") from error
 
 
@@ -112,7 +125,7 @@ def _arrays(path: Path, batch: Any) -> dict[str, np.ndarray]:
         if name not in _KNOWN:
             continue
         try:
-            read[name] = column.cast("float64").to_numpy(zero_copy_only=False)
+            read[name] = column.cast("float64", safe=False).to_numpy(zero_copy_only=False)
         except Exception as error:  # arrow has an error for each type
             raise GaitshiftError(f"{path}: column '{name}' does not hold numbers") from error
     return read
@@ -150,6 +163,11 @@ def _check_values(
     if np.isnan(period):
         known = apart[np.isfinite(apart)]
         period = float(known[0]) if known.size else np.nan
+        if known.size and not LEAST_PERIOD <= period <= MOST_PERIOD:
+            raise GaitshiftError(
+                f"{path}: rows are {period:.4g} apart in 'time'; it is in seconds, and "
+                f"{LEAST_PERIOD:g} to {MOST_PERIOD:g} s would be right"
+            )
     changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
     if changed.size:
         raise GaitshiftError(
@@ -157,6 +175,32 @@ def _check_values(
             f"before, the first ones {period:.4g} s: one rate throughout would be right"
         )
     return period
+
+
+def _down(path: Path, batch: dict[str, np.ndarray], rows: int, before: float) -> float:
+    """Sum of the vertical parts of gravity in a batch; `before` is that of the rows before it.
+
+    Raises:
+        GaitshiftError: gravity has no direction in a row, or points up on average.
+    """
+    vector = ATTITUDES[0]
+    names = ATTITUDES[0] if all(name in batch for name in vector) else ATTITUDES[1]
+    if names is vector:
+        length = np.linalg.norm(np.stack([batch[name] for name in vector]), axis=0)
+        none = np.flatnonzero(length < _LEAST_GRAVITY)
+        if none.size:
+            raise GaitshiftError(
+                f"{path}: row {rows + none[0] + 1}, gravity_x, _y, _z are 0 and point nowhere; "
+                "(0, 0, -1) when level would be right"
+            )
+    down = float(_gravity(batch)[:, 2].sum())
+    if before + down > 0.0:
+        right = "gravity_z = -1" if names is vector else "roll = pitch = 0 rad"
+        raise GaitshiftError(
+            f"{path}: by {', '.join(names)} gravity points up on average; {right} when level "
+            "would be right"
+        )
+    return down
 
 
 def _ends(rough: np.ndarray) -> list[int]:

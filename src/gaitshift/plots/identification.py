@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from gaitshift.command import CONTROL_PERIOD
-from gaitshift.identification.finding import Judged, Tuned
+from gaitshift.identification.finding import Judged
 from gaitshift.plots.palette import GROUND, INK, PALE, PAPER, QUIET
 from gaitshift.plots.style import check_target, house_style, save
 
@@ -34,9 +33,13 @@ OTHERS = "share of other passages with a shift"
 """Axes of a ROC curve."""
 
 
-def condition_map(tuned: Tuned, path: Path) -> Figure:
-    """Mean delay of a detection over α and β, where no robot shifted wrongly; and the choice."""
+def condition_map(one: Judged, path: Path) -> Figure:
+    """Mean delay of a detection over α and β, where no robot shifted wrongly; and the choice.
+
+    Of the recordings that chose; those that judged say what a step is.
+    """
     check_target(path)
+    tuned = one.tuned
     grid, tally = tuned.grid, tuned.tally
     quiet = tally.fired == 0
     mostly = tally.missed < 0.5
@@ -76,15 +79,13 @@ def condition_map(tuned: Tuned, path: Path) -> Figure:
             fontsize=12,
         )
         ends = "max" if (delay > LATEST).any() else "neither"
-        bar = cast(
-            Any, figure.colorbar(mesh, ax=axes, pad=0.02, extend="max" if late else "neither")
-        )
+        bar = cast(Any, figure.colorbar(mesh, ax=axes, pad=0.02, extend=ends))
         bar.set_label("mean distance until it is noticed [m]")
         bar.outline.set_visible(False)
-        seconds = choice.beta * CONTROL_PERIOD
+        soonest = f"{one.soonest:.2g} s at the soonest" if np.isfinite(one.soonest) else "never"
         axes.set_title(
             f"{tuned.candidate.name}\nα = {choice.alpha:.3g} {unit}".rstrip()
-            + f", β = {choice.beta:g} ({seconds:.2g} s at a count a step), leak {choice.leak:g}",
+            + f", β = {choice.beta:g} ({soonest}), leak {choice.leak:g}",
             loc="left",
             fontsize=12,
         )
@@ -97,34 +98,37 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
     """ROC curves of passages of a course against all others, a line a condition."""
     check_target(path)
     with house_style():
-        figure = Figure(figsize=(8.5, 5.6))
+        figure = Figure(figsize=(9.2, 5.6))
         axes = figure.subplots()
-        rows: list[tuple[float, str, str]] = []
+        rows: list[tuple[float, str, float, str]] = []
         kept = [one for one in judged if one.area(course) is not None]
         for index, one in enumerate(kept):
             area = one.area(course)
             x, y = roc(one.scores_on(course), one.other_scores)
             colour = LINES[index % len(LINES)] if index < len(LINES) else GROUND
             axes.plot(x, y, color=colour)
-            rows.append((area[0] if area else 0.0, one.tuned.candidate.name, colour))
-        for line, (area, name, colour) in enumerate(sorted(rows, reverse=True)):
+            tuned = one.tuned
+            rows.append((area[0] if area else 0.0, tuned.candidate.name, tuned.area_beta, colour))
+        for line, (area, name, beta, colour) in enumerate(sorted(rows, reverse=True)):
             axes.text(
                 1.03,
                 0.97 - 0.09 * line,
-                f"{area:.3f}  {name}",
+                f"{area:.3f}  {name}, β {beta:g}",
                 color=colour,
                 transform=axes.transAxes,
                 va="top",
                 fontsize=12,
             )
-        axes.text(1.03, 1.06, "area", color=QUIET, transform=axes.transAxes, va="top", fontsize=12)
+        axes.text(
+            1.03, 1.06, "area at β", color=QUIET, transform=axes.transAxes, va="top", fontsize=12
+        )
         axes.set_xlim(-0.01, 1.0)
         axes.set_ylim(0.0, 1.01)
         axes.set_xlabel(OTHERS)
         axes.set_ylabel(NOTICED)
         axes.set_title(f"passages of 3 m, {course} against the rest", loc="left", fontsize=12)
         figure.tight_layout()
-        figure.subplots_adjust(right=0.66)
+        figure.subplots_adjust(right=0.6)
         save(figure, path)
     return figure
 

@@ -15,6 +15,7 @@ from gaitshift.identification.report import (
     condition_rows,
     course_cells,
     course_rows,
+    hardest_first,
 )
 from gaitshift.plots.identification import LATEST, LINES, NOTICED, OTHERS, roc
 from gaitshift.plots.palette import gait_colours
@@ -23,6 +24,12 @@ from gaitshift.report.figures import Axis, Curve, Kind, Said, curves, heat_map
 from gaitshift.report.page import facts_table, figure, table, write_page
 from gaitshift.studies.transition_page import HEAD, row_cells
 from gaitshift.table import Row
+
+_NOTICED = {
+    "rough": "rough ground against all others",
+    "flat": "level ground against those of rough ground",
+}
+"""What ROC curves are about, by what is to be noticed."""
 
 _FALSE = Kind(name="shifts where it should not", colour="#f3d9c4")
 _MISSED = Kind(name="no shift at all, or most missed", colour="pale")
@@ -43,12 +50,12 @@ def write_identification_page(
     figures: dict[str, Mapping[str, Any]] = {}
     summary = [condition_cells(row) for row in condition_rows(judged)]
     sections = [("Side by side", table(CONDITIONS_HEAD, [(cells, None) for cells in summary]))]
-    areas = {course.course: judged[0].area(course.course) for course in judged[0].courses}
-    met = sorted((area[0], course) for course, area in areas.items() if area is not None)
-    for index, (_, course) in enumerate(met):
+    met = hardest_first(judged)
+    for index, course in enumerate(met):
         figures[f"roc{index}"] = _roc(judged, course)
-    folded = [_folded(course, figure(f"roc{i}"), i == 0) for i, (_, course) in enumerate(met)]
-    sections.append(("Passages of rough ground against all others", "".join(folded)))
+    folded = [_folded(course, figure(f"roc{i}"), i == 0) for i, course in enumerate(met)]
+    if folded:
+        sections.append((f"Passages of {_NOTICED[judged[0].tuned.way]}", "".join(folded)))
     folded = list[str]()
     for index, one in enumerate(judged):
         inner = f"<p>{html.escape(one.tuned.candidate.note.capitalize())}.</p>"
@@ -96,7 +103,7 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
 
 
 def _titled(cells: tuple[str, ...]) -> str:
-    name, alpha, beta, seconds, metres, leak, noticed, delay, false, _ = cells
+    name, alpha, beta, seconds, metres, leak, noticed, delay, false, *_ = cells
     numbers = f"α {alpha}, β {beta} ({seconds or '–'} s, {metres or '–'} m), leak {leak}"
     return f"{name}: {numbers}: noticed {noticed}, after {delay or '–'} m; {false} false"
 
@@ -142,7 +149,7 @@ def _roc(judged: Sequence[Judged], course: str) -> dict[str, Any]:
             name = one.tuned.candidate.name
             x, y = roc(one.scores_on(course), one.other_scores)
             colour = LINES[index % len(LINES)]
-            label = f"{name} {area[0]:.3f}"
+            label = f"{name} {area[0]:.3f} at β {one.tuned.area_beta:g}"
             series.append((area[0], Curve(name=name, label=label, colour=colour, x=x, y=y)))
     series.sort(key=lambda pair: -pair[0])
     return curves(
