@@ -11,7 +11,7 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification.recording import Recording, Way
 from gaitshift.legs import LEGS
-from gaitshift.log import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
+from gaitshift.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
 from gaitshift.switching import LegOdometry
 
 _AXES = ("x", "y", "z")

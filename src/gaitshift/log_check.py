@@ -1,0 +1,143 @@
+"""What no robot can have left behind: the checks of a log file."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from gaitshift.errors import GaitshiftError
+
+TIMELESS = ("gaits", "robot", "terrain")
+"""What the names of fields begin with whose first axis is not time."""
+
+_FINITE = ("time", "qpos", "qvel", "torque", "foot_position_w", "command")
+"""Arrays that hold numbers at all times, and so does the ground; heights of feet that never
+touched, and what conditions make of a robot that lies, may be anything."""
+
+LEAST_PERIOD, MOST_PERIOD = 0.0005, 0.5
+"""Between two entries [s]; ours: no robot is controlled faster, and no step is seen slower, so what
+lies outside is no time in seconds."""
+
+RATE_TOLERANCE = 0.05
+"""By how much of a period two entries may be nearer or further apart than the first two."""
+
+_HOLDS = {"b": "true and false", "f": "numbers", "i": "whole numbers"}
+"""What an array of this kind holds, in words."""
+
+
+def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) -> dict[str, Any]:
+    """What a log file holds, its arrays as they are declared, if a robot can have left it.
+
+    Args:
+        path: of the file, to name.
+        values: what it holds, by name.
+        declared: the types of the same names, as jaxtyping writes them.
+
+    Raises:
+        GaitshiftError: an array of another shape or kind, numbers that are not finite, a time that
+            does not rise at one rate.
+    """
+    whole = {**values, **_shaped(path, values, declared)}
+    _check_numbers(path, whole)
+    _check_time(path, whole["time"])
+    return whole
+
+
+def _shaped(
+    path: Path, values: Mapping[str, Any], types: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    """The arrays in the shapes and of the kinds that are declared."""
+    declared = {name: _declared(of) for name, of in types.items()}
+    sizes, shaped = dict[str, int](), dict[str, np.ndarray]()
+    for name in sorted((n for n, of in declared.items() if of is not None), key="qpos".__ne__):
+        array: np.ndarray = values[name]
+        wanted, kind = declared[name] or ((), "")
+        known = [int(dim) if dim.isdigit() else sizes.get(dim) for dim in wanted]
+        if array.ndim != len(known) or any(
+            size not in (None, n) for size, n in zip(known, array.shape, strict=True)
+        ):
+            right = ", ".join(str(sizes.get(dim, dim)) for dim in wanted)
+            right += "," if len(wanted) == 1 else ""
+            raise GaitshiftError(
+                f"{path}: '{name}' has the shape {array.shape}; ({right}) would be right"
+            )
+        given = {"u": "i"}.get(array.dtype.kind, array.dtype.kind)
+        if given != kind and (given, kind) != ("i", "f"):
+            raise GaitshiftError(
+                f"{path}: '{name}' holds {array.dtype}; {_HOLDS[kind]} would be right"
+            )
+        if 0 in array.shape:
+            raise GaitshiftError(
+                f"{path}: '{name}' is empty, {array.shape}; a log has steps and robots"
+            )
+        sizes |= zip(wanted, array.shape, strict=True)
+        as_it_is = array.dtype.kind == kind
+        shaped[name] = array if as_it_is else array.astype({"f": float, "i": np.int64}[kind])
+    return shaped
+
+
+def _declared(annotation: Any) -> tuple[tuple[str, ...], str] | None:
+    """Axes and kind of the arrays that a field takes; None where it takes none."""
+    of: Any = annotation if hasattr(annotation, "dim_str") else (*get_args(annotation), None)[0]
+    if not hasattr(of, "dim_str"):
+        return None
+    kinds = {np.dtype(name).kind for name in ("bool", "int64", "float64") if name in of.dtypes}
+    return tuple(of.dim_str.split()), kinds.pop()
+
+
+def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
+    """Refuses what no robot can have done."""
+    for name in (*_FINITE, *(n for n in values if n.startswith("terrain_"))):
+        finite = np.isfinite(values[name])
+        if not finite.all():
+            raise GaitshiftError(
+                f"{path}: '{name}' is not finite{_where(~finite, name)}; numbers would be right"
+            )
+    length = np.linalg.norm(values["qpos"][..., 3:7], axis=-1)
+    wrong = np.abs(length - 1.0) > 0.01
+    if wrong.any():
+        raise GaitshiftError(
+            f"{path}: 'qpos' has a quaternion of length {length[wrong][0]:.3g}"
+            f"{_where(wrong, 'qpos')}; 1 would be right"
+        )
+    gait, names = values["gait"], values["gaits"]
+    if gait.min() < 0 or gait.max() >= len(names):
+        raise GaitshiftError(
+            f"{path}: 'gait' reaches from {gait.min()} to {gait.max()}; 0 to {len(names) - 1} "
+            "would be right, places in 'gaits'"
+        )
+
+
+def _where(wrong: np.ndarray, name: str) -> str:
+    """The first place where an array is wrong, in words."""
+    if name.startswith(TIMELESS):
+        return ""
+    step, *robot = np.argwhere(wrong)[0][:2]
+    return f" at entry {step}" + "".join(f" of robot {number}" for number in robot)
+
+
+def _check_time(path: Path, time: np.ndarray) -> None:
+    """Refuses a time that does not rise at one rate."""
+    apart = np.diff(time)
+    if not apart.size:
+        return
+    standing = np.flatnonzero(apart <= 0.0)
+    if standing.size:
+        raise GaitshiftError(
+            f"{path}: 'time' does not rise at entry {standing[0] + 1}; entries must be in order, "
+            "each time once"
+        )
+    period = float(apart[0])
+    if not LEAST_PERIOD <= period <= MOST_PERIOD:
+        raise GaitshiftError(
+            f"{path}: entries of 'time' are {period:.4g} apart; it is in seconds, and "
+            f"{LEAST_PERIOD:g} to {MOST_PERIOD:g} s would be right"
+        )
+    changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
+    if changed.size:
+        at = changed[0]
+        raise GaitshiftError(
+            f"{path}: entry {at + 1} of 'time' comes {apart[at]:.4g} s after the one before, the "
+            f"first ones {period:.4g} s: one rate throughout would be right"
+        )
