@@ -4,9 +4,9 @@ Usage: python tools/training_evidence.py seeds|additions|shifts [--jobs N] [--se
 
 `seeds` trains trot, pace and bound on flat ground with five fresh seeds each; `additions` trains
 trot without each of the reward's additions in turn, `--seeds` each, else three; one run takes
-about five minutes on a core. `shifts` trains bound to the end, two seeds with and two without episodes
-that begin in the midst of a stride, a quarter of an hour each. Broken off, the same command goes on
-where it stopped (runs/evidence).
+about five minutes on a core. `shifts` trains bound to the end, two seeds with and two without
+episodes that begin in the midst of a stride, a quarter of an hour each. Broken off, the same
+command goes on where it stopped (runs/evidence).
 """
 
 import argparse
