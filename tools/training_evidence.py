@@ -3,10 +3,10 @@
 Usage: python tools/training_evidence.py seeds|additions|shifts [--jobs N] [--seeds N]
 
 `seeds` trains trot, pace and bound on flat ground with five fresh seeds each; `additions` trains
-trot without each of the reward's additions in turn, `--seeds` each, else three; one run takes
-about five minutes on a core. `shifts` trains bound to the end, two seeds with and two without
-episodes that begin in the midst of a stride, a quarter of an hour each. Broken off, the same
-command goes on where it stopped (runs/evidence).
+trot without each of the reward's additions in turn, three seeds each; one run takes about five
+minutes on a core. `shifts` trains bound to the end, two seeds with and two without episodes
+that begin in the midst of a stride, a quarter of an hour each. `--seeds` changes how many seeds.
+Broken off, the same command goes on where it stopped (runs/evidence).
 """
 
 import argparse
@@ -35,16 +35,13 @@ from gaitshift.training.run import POLICY
 
 RUNS = Path("runs/evidence")
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
-FRESH_SEEDS = range(1, 6)
-"""The shipped policies have seed 0."""
-ABLATION_SEEDS = 3
 ABLATED = "trot"
 JUDGED = EvaluationConfig(episodes=64, seconds=12.0)
 
-SEEDS_HEAD = """# Five fresh seeds
+SEEDS_HEAD = """# Fresh seeds
 
 The flat stage of the default recipe alone ({iterations} iterations, {steps:.1f} million control
-steps, about five minutes on one core), for five seeds that are not those of the shipped policies.
+steps, about five minutes on one core), for {seeds} seeds that no shipped policy has.
 Each policy is judged on flat ground, 64 robots for 12 s, by the limits of `gaitshift evaluate`,
 whose speed loop trims the asked speed; open loop: the mean speed without it.
 This page is made by `python tools/training_evidence.py seeds`.
@@ -60,7 +57,6 @@ This page is made by `python tools/training_evidence.py additions --seeds {seeds
 """
 SHIFTED = "bound"
 """The gait that shifts into fail most often."""
-SHIFT_SEEDS = range(2)
 MIXED_STARTS = 0.5
 SWITCHES = 1024
 ROUGH = EvaluationConfig(episodes=64, seconds=20.0)
@@ -117,16 +113,16 @@ def judged(
     return {job.name: evaluate(policy.load(RUNS / job.name / POLICY), config)[0] for job in jobs}
 
 
-def write_seeds(processes: int) -> Path:
-    """The table of fresh seeds."""
-    jobs = jobs_of([setting()], FIRST_GAITS, FRESH_SEEDS)
+def write_seeds(processes: int, seeds: int) -> Path:
+    """The table of fresh seeds; the shipped policies have seed 0."""
+    jobs = jobs_of([setting()], FIRST_GAITS, range(1, seeds + 1))
     figures = judged(jobs, processes)
     unaided = judged(jobs, processes, replace(JUDGED, open_loop=True))
     head = ("gait", "seed", "verdict", "survival", "speed [m/s]", "open loop [m/s]", "cycles [Hz]")
     head += ("pattern",)
     head += ("touchdowns a cycle", "least consistency", "least clearance [cm]", "CoT", "misses")
     rows: list[tuple[str, ...]] = []
-    for job in jobs:
+    for job in sorted(jobs, key=lambda job: FIRST_GAITS.index(job.gait)):
         one = figures[job.name]
         verdict = one["verdict"]
         rows.append(
@@ -148,11 +144,11 @@ def write_seeds(processes: int) -> Path:
         )
     clean = [
         f"{gait} {sum(figures[job.name]['verdict']['clean'] for job in jobs if job.gait == gait)}"
-        f" of {len(FRESH_SEEDS)}"
+        f" of {seeds}"
         for gait in FIRST_GAITS
     ]
     words = f"Clean: {', '.join(clean)}.\n"
-    return _write("seeds.md", SEEDS_HEAD, words, head, rows)
+    return _write("seeds.md", SEEDS_HEAD, words, head, rows, seeds)
 
 
 def write_additions(processes: int, seeds: int) -> Path:
@@ -178,10 +174,10 @@ def write_additions(processes: int, seeds: int) -> Path:
                 _mean(of, "cost_of_transport", float),
             )
         )
-    return _write("additions.md", ADDITIONS_HEAD.replace("{seeds}", str(seeds)), "", head, rows)
+    return _write("additions.md", ADDITIONS_HEAD, "", head, rows, seeds)
 
 
-def write_shifts(processes: int) -> Path:
+def write_shifts(processes: int, seeds: int) -> Path:
     """The table of shifts into policies that were trained for them, and into others."""
     plain = Recipe(threads=1, physics_threads=1)
     flat, rough = plain.stages
@@ -190,7 +186,7 @@ def write_shifts(processes: int) -> Path:
         Default(name="plain", group="shifts", label="as it is", recipe=plain),
         Default(name="mixed", group="shifts", label="mixed starts", recipe=mixed),
     )
-    jobs = jobs_of(settings, (SHIFTED,), SHIFT_SEEDS)
+    jobs = jobs_of(settings, (SHIFTED,), range(seeds))
     figures = judged(jobs, processes)
     old = [gait for gait in FIRST_GAITS if gait != SHIFTED]
     grounds = ("perlin:0.15", "stairs:0.05", "step:0.10")
@@ -227,9 +223,9 @@ def write_shifts(processes: int) -> Path:
                     *(f"{share:.3f}" for share in rough),
                 )
             )
-        cells = _shift_cells(sums.tolist(), SWITCHES * len(SHIFT_SEEDS))
+        cells = _shift_cells(sums.tolist(), SWITCHES * seeds)
         rows.append((setting.label, "all", *cells, *[""] * (3 + len(grounds))))
-    return _write("shifting/trained-on-shifts.md", SHIFTS_HEAD, "", head, rows)
+    return _write("shifting/trained-on-shifts.md", SHIFTS_HEAD, "", head, rows, seeds)
 
 
 def _shift_cells(counts: list[int], switches: int) -> tuple[str, ...]:
@@ -248,7 +244,12 @@ def _mean(figures: list[dict[str, Any]], name: str, of: Callable[[Any], float]) 
 
 
 def _write(
-    name: str, head: str, words: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]
+    name: str,
+    head: str,
+    words: str,
+    columns: tuple[str, ...],
+    rows: list[tuple[str, ...]],
+    seeds: int,
 ) -> Path:
     recipe = setting().recipe
     steps = recipe.iterations * recipe.robots * recipe.steps / 1e6
@@ -256,22 +257,29 @@ def _write(
     table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     path = RESULTS / name
     text = head.format(
-        iterations=recipe.iterations, steps=steps, share=MIXED_STARTS, switches=SWITCHES
+        iterations=recipe.iterations,
+        steps=steps,
+        share=MIXED_STARTS,
+        switches=SWITCHES,
+        seeds=seeds,
     )
     path.write_text(f"{text}\n{words}\n{table}\n" if words else f"{text}\n{table}\n")
     return path
 
 
-WRITERS = {"seeds": write_seeds, "shifts": write_shifts}
+WRITERS = {
+    "seeds": (write_seeds, 5),
+    "additions": (write_additions, 3),
+    "shifts": (write_shifts, 2),
+}
+"""What writes each page, and from how many seeds."""
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=(*WRITERS, "additions"))
+    parser.add_argument("what", choices=tuple(WRITERS))
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--seeds", type=int, default=ABLATION_SEEDS, help="of each addition")
+    parser.add_argument("--seeds", type=int)
     options = parser.parse_args()
-    if options.what == "additions":
-        print(f"written: {write_additions(options.jobs, options.seeds)}")
-    else:
-        print(f"written: {WRITERS[options.what](options.jobs)}")
+    write, usual = WRITERS[options.what]
+    print(f"written: {write(options.jobs, options.seeds or usual)}")

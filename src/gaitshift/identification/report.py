@@ -86,7 +86,7 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
     other = "back" if tuned.way == "rough" else "there"
     return _TITLES[tuned.way], (
         f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. β in "
-        "time and way: until k exceeds it where all values lie beyond α, at the robots' mean "
+        "time and distance: until k exceeds it where all values lie beyond α, at the robots' mean "
         f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course, at "
         f"{_area_words(tuned.choice)}. Chattered: robots that would have shifted more than once "
         f"there and once back for each rough stretch, had they taken the shipped way {other} "

@@ -183,8 +183,8 @@ def _down(path: Path, batch: dict[str, np.ndarray], rows: int, before: float) ->
     Raises:
         GaitshiftError: gravity has no direction in a row, or points up on average.
     """
-    vector = ATTITUDES[0]
-    names = ATTITUDES[0] if all(name in batch for name in vector) else ATTITUDES[1]
+    vector, angles = ATTITUDES
+    names = vector if all(name in batch for name in vector) else angles
     if names is vector:
         length = np.linalg.norm(np.stack([batch[name] for name in vector]), axis=0)
         none = np.flatnonzero(length < _LEAST_GRAVITY)

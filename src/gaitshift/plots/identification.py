@@ -25,8 +25,9 @@ LINES = (
 
 LATEST = 6.0
 """Delays are shaded up to here [m]."""
-_FALSE = "#f3d9c4"
 
+FALSE = "#f3d9c4"
+"""Where robots shift that should not."""
 
 NOTICED = "share of the passages to be noticed with a shift"
 OTHERS = "share of other passages with a shift"
@@ -54,7 +55,7 @@ def condition_map(one: Judged, path: Path) -> Figure:
             grid.betas, grid.alphas, delay, cmap=shades, vmin=0.0, vmax=LATEST, shading="nearest"
         )
         alarmed = np.where(~quiet, 1.0, np.nan)
-        false = LinearSegmentedColormap.from_list("false", [_FALSE, _FALSE])
+        false = LinearSegmentedColormap.from_list("false", [FALSE, FALSE])
         axes.pcolormesh(grid.betas, grid.alphas, alarmed, cmap=false, shading="nearest")
         choice = tuned.choice
         axes.plot(choice.beta, choice.alpha, "o", color=PAPER, markersize=9, mec=INK, mew=2)
@@ -67,7 +68,7 @@ def condition_map(one: Judged, path: Path) -> Figure:
             axis.set_major_formatter(FuncFormatter(_plain))
             axis.set_minor_formatter(NullFormatter())
         regions = (
-            (bool((~quiet).any()), _FALSE, "shifts where it should not"),
+            (bool((~quiet).any()), FALSE, "shifts where it should not"),
             (bool((quiet & ~mostly).any()), PALE, "no shift at all, or most missed"),
         )
         axes.legend(

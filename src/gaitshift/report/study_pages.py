@@ -17,7 +17,7 @@ from gaitshift.identification.report import (
     course_rows,
     hardest_first,
 )
-from gaitshift.plots.identification import LATEST, LINES, NOTICED, OTHERS, roc
+from gaitshift.plots.identification import FALSE, LATEST, LINES, NOTICED, OTHERS, roc
 from gaitshift.plots.palette import gait_colours
 from gaitshift.report.data import title_of
 from gaitshift.report.figures import Axis, Curve, Kind, Said, curves, heat_map
@@ -31,7 +31,7 @@ _NOTICED = {
 }
 """What ROC curves are about, by what is to be noticed."""
 
-_FALSE = Kind(name="shifts where it should not", colour="#f3d9c4")
+_FALSE = Kind(name="shifts where it should not", colour=FALSE)
 _MISSED = Kind(name="no shift at all, or most missed", colour="pale")
 
 
