@@ -1,6 +1,7 @@
 """What every test runs under: shapes and types checked, and no screen needed."""
 
 import os
+import signal
 
 import pytest
 from beartype import BeartypeConf, beartype
@@ -17,6 +18,10 @@ install_import_hook("gaitshift", "conftest.check_types")
 
 if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
     os.environ.setdefault("MUJOCO_GL", "egl")
+
+# A shell lets what it starts in the background ignore Ctrl-C, and so would the commands under test.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Neither a slow nor a busy machine is a fault, so no example has a deadline.
 settings.register_profile("here", deadline=None, suppress_health_check=[HealthCheck.too_slow])
