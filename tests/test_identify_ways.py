@@ -67,7 +67,35 @@ def test_on_the_way_to_flat_ground_each_robot_begins_where_it_comes_to_rough_gro
     np.testing.assert_allclose(seen.distance[[0, 100], 0], [0.0, 1.0])
     np.testing.assert_allclose(seen.distance[[0, 100], 1], [0.0, 1.0])
     assert faced[[0, 10], :2, 0].tolist() == [[400.0, 450.0], [410.0, 460.0]]
-    assert facing(rec, values, "rough")[0] is rec
+
+
+def test_on_the_way_to_rough_ground_each_robot_begins_where_it_first_walks_on_smooth_ground():
+    """What it starts on it has not come to; rough ground alone counts as it is."""
+    rec = crossing(robots=4)
+    values = np.arange(1400.0)[:, None, None] * np.ones((1, 4, 1))
+    assert facing(rec, values, "rough")[0] is rec, "all start on smooth ground"
+    rec.rough[:300, 1] = True
+    rec.rough[:, 2] = True
+    rec.alive[600:, 1] = False
+    seen, faced = facing(rec, values, "rough")
+    assert seen.rough[:, 0].tolist() == rec.rough[:, 0].tolist()
+    assert seen.rough[:600, 1].tolist() == [False] * 100 + [True] * 400 + [False] * 100
+    assert seen.rough[:, 2].all()
+    assert seen.alive.sum(axis=0).tolist() == [1400, 300, 1400, 1400]
+    np.testing.assert_allclose(seen.distance[[0, 100], 1], [0.0, 1.0])
+    assert faced[[0, 10], 1, 0].tolist() == [300.0, 310.0]
+
+
+def test_rough_ground_that_a_table_begins_on_was_not_come_to(tmp_path):
+    """Its first metre is left out where smooth ground follows, and counts where none does."""
+    rec = crossing(robots=1)
+    rec.rough[:100] = True
+    walk = table(tmp_path / "walk.csv", rec)
+    assert [len(one.time) for one in passages(walk)] == [700, 600]
+    assert [len(one.time) for one in passages(walk, "flat")] == [400, 1000]
+    rec.rough[:] = True
+    rough = table(tmp_path / "rough.csv", rec)
+    assert [len(one.time) for one in passages(rough)] == [1400]
 
 
 def test_a_firing_before_the_first_rough_ground_is_no_detection_of_its_end():

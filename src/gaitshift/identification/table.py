@@ -55,7 +55,8 @@ def columns_of(signal: str) -> tuple[str, ...]:
 def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
     """The passages of a log: smooth ground up to where it ends, and the rough ground behind it.
 
-    On the way to flat ground it is rough ground, and the smooth ground behind it. A file is read
+    On the way to flat ground it is rough ground, and the smooth ground behind it. Rough ground that
+    a log begins on was not come to, and is left out where smooth ground follows. A file is read
     batch by batch, so that gigabytes need no more memory than a passage.
 
     Raises:
@@ -63,6 +64,7 @@ def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
     """
     columns: dict[str, list[np.ndarray]] = {}
     rows, before, period, touched, down = 0, np.nan, np.nan, False, 0.0
+    may_begin_rough = way == "rough"
     for batch in _batches(path):
         _check_columns(path, batch)
         period = _check_values(path, batch, rows, before, period)
@@ -76,7 +78,9 @@ def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
         rough = whole["rough"] > 0.5
         start = 0
         for end in _ends(rough if way == "rough" else ~rough):
-            if end - start > 1:
+            not_come_to = may_begin_rough and rough[start:end].all() and not rough[end]
+            may_begin_rough = False
+            if end - start > 1 and not not_come_to:
                 yield _recording(path, whole, slice(start, end))
             start = end
         columns = {name: [values[start:]] for name, values in whole.items()}
