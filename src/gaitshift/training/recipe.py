@@ -130,9 +130,8 @@ class Recipe:
     """Iteration at which λ has grown to 1, by the same step each iteration."""
     settle: float = 0.35
     """Last share of the iterations, in which the policy settles: `desired_kl` and `entropy` fall to
-    a tenth, but not before strictness and commands have grown; ours: without it the speed of the
-    last policy is off by up to 0.2 m/s, now to this side, now to that, and a policy that settles
-    while more and more is asked for is clean less often."""
+    a tenth; ours: without it the speed of the last policy is off by up to 0.2 m/s, now to this
+    side, now to that."""
     averaged: float = 0.24
     """Last share of the iterations whose checkpoints' actors are averaged into the policy; ours:
     what a policy does on edges and how fast it walks goes up and down from one to the next, and
@@ -197,9 +196,9 @@ class Recipe:
 
     def settling(self, iteration: int) -> float:
         """The factor on `desired_kl` and `entropy` at this iteration."""
-        start = max((1.0 - self.settle) * self.iterations, self.strict_until, self.command_until)
-        if start >= self.iterations:
+        if self.settle == 0:
             return 1.0
+        start = (1.0 - self.settle) * self.iterations
         return 1.0 - 0.9 * _grown(iteration, start, self.iterations)
 
     def is_averaged(self, iteration: int) -> bool:
