@@ -87,15 +87,21 @@ def test_on_the_way_to_rough_ground_each_robot_begins_where_it_first_walks_on_sm
 
 
 def test_rough_ground_that_a_table_begins_on_was_not_come_to(tmp_path):
-    """Its first metre is left out where smooth ground follows, and counts where none does."""
+    """Its first metre does not count where smooth ground follows, and does where none does."""
     rec = crossing(robots=1)
     rec.rough[:100] = True
     walk = table(tmp_path / "walk.csv", rec)
     assert [len(one.time) for one in passages(walk)] == [700, 600]
     assert [len(one.time) for one in passages(walk, "flat")] == [400, 1000]
+    noticed_at_once = as_given(height_candidates()[:1], way="rough", alpha=1e-9, beta=0.0)
+    (judged,) = judge(noticed_at_once, lambda: passages(walk))
+    (course,) = judged.courses
+    assert course.tally.came.item() == 0, "on smooth ground it has fired before"
+    assert course.tally.fired.item() == 2, "in each passage"
     rec.rough[:] = True
     rough = table(tmp_path / "rough.csv", rec)
-    assert [len(one.time) for one in passages(rough)] == [1400]
+    (judged,) = judge(noticed_at_once, lambda: passages(rough))
+    assert judged.courses[0].tally.detected.item() == 1
 
 
 def test_a_firing_before_the_first_rough_ground_is_no_detection_of_its_end():

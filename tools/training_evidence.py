@@ -44,7 +44,7 @@ The flat stage of the default recipe alone ({iterations} iterations, {steps:.1f}
 steps, about five minutes on one core), for {seeds} seeds that no shipped policy has.
 Each policy is judged on flat ground, 64 robots for 12 s, by the limits of `gaitshift evaluate`,
 whose speed loop trims the asked speed; open loop: the mean speed without it.
-This page is made by `python tools/training_evidence.py seeds`.
+This page is made by `python tools/training_evidence.py seeds --seeds {seeds}`.
 """
 ADDITIONS_HEAD = """# The additions to Table I, taken away
 
@@ -68,8 +68,8 @@ episodes begins in the midst of a stride that is no gait's, each leg where anoth
 (`Stage.mixed_starts`). Then {switches} robots shift into it at all phases of a trot, and as many of
 a pace, on noise of 0.10 m, as in `gaitshift transitions`; touchdowns (of the foot furthest from
 one a cycle) and cost of transport on flat ground, 64 robots for 12 s; survival of 20 s on rough
-ground, 64 robots. None of the four is a shipped policy.
-This page is made by `python tools/training_evidence.py shifts`.
+ground, 64 robots. None of them is a shipped policy.
+This page is made by `python tools/training_evidence.py shifts --seeds {seeds}`.
 """
 
 
