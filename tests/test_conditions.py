@@ -33,6 +33,7 @@ from gaitshift.switching import (
 )
 from gaitshift.switching.heading import HeadingWatch
 from gaitshift.switching.plane import deviation
+from gaitshift.switching.surprise import STEADY
 from turning import rotation
 
 quick = settings(max_examples=60, deadline=None)
@@ -94,14 +95,42 @@ def test_robots_one_by_one_are_the_batch_bit_for_bit(kind):
     few = {"memory": 1} if kind == "touchdown_surprise" else {}  # they seldom tread new ground
     rng, statistic = np.random.default_rng(3), STATISTICS[kind](**few)
     batch, singles = statistic.start(5), [statistic.start(1) for _ in range(5)]
-    for step in range(1000):
+    for step in range(3000):
         signals = random_signals(rng, 5, step)
         batch, values = statistic.step(batch, signals)
         assert values.shape == (5, statistic.width)
         for robot in range(5):
             singles[robot], alone = statistic.step(singles[robot], signals.of(np.array([robot])))
             np.testing.assert_array_equal(alone[0], values[robot])
-    assert not np.isnan(values).any(), "ten seconds are enough for all"
+    assert not np.isnan(values).any(), "half a minute is enough for all"
+
+
+@pytest.mark.parametrize("kind", STATISTICS)
+def test_who_shifts_begins_anew_and_the_others_go_on(kind):
+    """From a firing on a robot is told what a condition tells it that has never seen it before."""
+    rng, statistic = np.random.default_rng(7), STATISTICS[kind]()
+    condition = Condition(statistic=statistic, alpha=1e-6, beta=3.0, statistic_back=ContactTiming())
+    walk = [random_signals(rng, 3, step) for step in range(700)]
+    state, nobody = condition.start(3), np.zeros(3, dtype=bool)
+    for step, signals in enumerate(walk[:600]):
+        before = state
+        state, fires = condition.step(state, signals, nobody)
+        if not fires.any():
+            continue
+        fresh, plain = condition.start(3), replace(condition, reset=False)
+        ours, _ = plain.step(before, signals, nobody)
+        for later in walk[step + 1 : step + 60]:
+            fresh, _ = plain.step(fresh, later, nobody)
+            ours, _ = plain.step(ours, later, nobody)
+            after, _ = plain.step(state, later, nobody)
+            for name in ("statistic", "statistic_back"):
+                parts = (arrays_in(getattr(one, name)) for one in (fresh, ours, after))
+                for anew, on, mine in zip(*parts, strict=True):
+                    np.testing.assert_array_equal(mine[fires], anew[fires])
+                    np.testing.assert_array_equal(mine[~fires], on[~fires])
+            state = after
+        return
+    pytest.fail("it fires on such signals")
 
 
 @pytest.mark.parametrize("kind", STATISTICS)
@@ -282,7 +311,32 @@ def test_a_slope_is_not_roughness_and_waves_are(statistic):
     }
     worst = {name: np.nanmax(course(statistic, z)[100:]) for name, z in grounds.items()}
     assert worst["slope"] < 0.012, "what odometry is off by"
-    assert worst["waves"] > 0.02, "a sine times a cosine of 5 cm has a deviation of 2.5 cm"
+    if isinstance(statistic, TouchdownSurprise):
+        assert worst["waves"] > 20.0 * worst["slope"], "changes of errors, in a body that is turned"
+    else:
+        assert worst["waves"] > 0.02, "a sine times a cosine of 5 cm has a deviation of 2.5 cm"
+
+
+def test_who_sways_is_told_less_in_proportion():
+    """Far faster than the heading is followed a sway of A is off it by A/√2 in the mean."""
+
+    def told(sway):
+        statistic, state, seen = TouchdownSurprise(), None, []
+        waves = strolling(
+            lambda x, y: 0.05 * math.sin(5 * x) * math.cos(7 * y), turn=0.0, wobble=0.0, seconds=8.0
+        )
+        for _, signals in waves:
+            state = state or statistic.start(1)
+            yaw = np.array([sway * math.sin(20.0 * math.pi * signals.time)])
+            state, value = statistic.step(state, replace(signals, yaw=yaw))
+            seen.append(value[0, 0])
+        return np.nanmean(seen[400:])
+
+    still = told(0.0)
+    assert told(0.5 * STEADY) == pytest.approx(still, rel=1e-3), (
+        "who sways by less than a steady walker is told all"
+    )
+    assert told(8.0 * STEADY) == pytest.approx(still / (8.0 / math.sqrt(2.0)), rel=0.05)
 
 
 @pytest.mark.parametrize("speed", [1.0, -1.0])
@@ -311,7 +365,7 @@ def test_changes_of_surprise_are_averaged_by_their_squares():
 
 
 def test_where_a_slope_begins_touches_surprise_less_than_a_step_of_its_rise_in_a_stride():
-    walk = {"turn": 0.0, "wobble": 0.0, "seconds": 6.0}
+    walk = {"turn": 0.0, "wobble": 0.0, "seconds": 20.0}
     rise = math.tan(math.radians(10.0))
     bend = course(TouchdownSurprise(), lambda x, y: rise * np.maximum(x - 2.0, 0.0), **walk)
     step = course(TouchdownSurprise(), lambda x, y: 0.1 * (x > 2.0), **walk)
@@ -320,7 +374,7 @@ def test_where_a_slope_begins_touches_surprise_less_than_a_step_of_its_rise_in_a
 
 
 def test_on_heights_that_know_nothing_of_one_another_it_is_their_deviation():
-    """The plane through a dozen of them adds some 10 %, the larger of two estimates some more."""
+    """The plane through a dozen of them adds some 10 %, and means start at 0."""
     heights = np.random.default_rng(5).normal(scale=0.03, size=(400, 41))
     walk = {"turn": 0.0, "wobble": 0.0, "seconds": 18.0}
     seen = course(
@@ -334,8 +388,8 @@ def follow(yaws):
     watch = HeadingWatch()
     state, off = watch.start(1), []
     for yaw in yaws:
-        state, thrown = watch.step(state, replace(standing(), yaw=np.array([yaw])))
-        off.append(bool(thrown[0]))
+        state, error = watch.step(state, replace(standing(), yaw=np.array([yaw])))
+        off.append(abs(error[0]) > watch.limit)
     return np.array(off)
 
 
@@ -366,7 +420,7 @@ def test_who_stumbles_is_told_nothing_until_there_are_errors_enough_again():
         seen.append(value[0, 0])
     known = ~np.isnan(np.array(seen))
     assert known[390:400].all()
-    assert not known[402:500].any(), "six earlier touches, and seven on new ground"
+    assert not known[402:500].any(), "six earlier touches, and four on new ground"
     assert known[-50:].all()
 
 

@@ -127,7 +127,7 @@ def test_oscillators_shift_by_the_very_condition_of_trained_policies():
     """Trot to bound on noise, by an α between what flat ground and the noise show."""
     condition = Condition(
         statistic=TouchdownSurprise(),
-        alpha=0.011,
+        alpha=0.002,
         beta=5.0,
         alpha_back=0.005,
         beta_back=1e6,

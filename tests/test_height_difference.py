@@ -183,8 +183,9 @@ def test_height_is_that_of_the_last_touch_and_is_kept_in_swing():
     np.testing.assert_array_equal(state.statistic, [[0.1, 0.6, np.nan, 0.8]])
 
 
-def test_firing_restarts_the_count_and_keeps_the_heights():
-    condition = replace(PAPER, beta=6.0, alpha_back=0.2, beta_back=2.0)
+@pytest.mark.parametrize("reset", [True, False])
+def test_firing_restarts_count_and_heights_or_neither(reset):
+    condition = replace(PAPER, beta=6.0, alpha_back=0.2, beta_back=2.0, reset=reset)
     rough, flat = positions(np.array([[0.0, 0.3, 0.6, 0.9]])), positions(np.zeros((1, 4)))
     state, history = condition.start(1), []
     shifted = np.array([False])
@@ -196,12 +197,19 @@ def test_firing_restarts_the_count_and_keeps_the_heights():
         )
         state, fire = condition.step(state, signals, shifted)
         shifted = shifted ^ fire
-        history.append((state.k.item(), fire.item(), state.statistic[0, 3].item()))
-    assert history == [
-        (6.0, False, 0.9), (0.0, True, 0.9), (0.0, False, 0.9),
-        (1.0, False, 0.0), (2.0, False, 0.0), (0.0, True, 0.0),
-        (6.0, False, 0.9), (0.0, True, 0.9),
+        height = state.statistic[0, 3].item()
+        history.append((state.k.item(), fire.item(), None if math.isnan(height) else height))
+    anew = [
+        (6.0, False, 0.9), (0.0, True, None), (0.0, False, 0.9),
+        (1.0, False, 0.0), (2.0, False, 0.0), (0.0, True, None),
+        (6.0, False, 0.9), (0.0, True, None),
     ]  # fmt: skip
+    on = [
+        (6.0, False, 0.9), (12.0, True, 0.9), (12.0, True, 0.9),
+        (12.0, True, 0.0), (13.0, True, 0.0), (13.0, True, 0.0),
+        (13.0, True, 0.9), (19.0, True, 0.9),
+    ]  # fmt: skip
+    assert history == (anew if reset else on)
 
 
 def test_alpha_can_change_between_steps_and_the_count_goes_on():

@@ -290,9 +290,7 @@ def test_shifts_there_and_back_are_those_of_a_live_condition(statistic_back):
         state, fires = condition.step(state, signals, shifted)
         shifted = shifted ^ fires
         expected += fires & rec.alive[t]
-    values = [rec.values(s) for s in (condition.statistic, statistic_back or condition.statistic)]
-    there, back = (condition.rough, values[0]), (condition.flat, values[1])
-    np.testing.assert_array_equal(shifts(there, back, rec.alive), expected)
+    np.testing.assert_array_equal(shifts(rec, condition), expected)
     assert expected.min() > 2, "they chatter"
 
 

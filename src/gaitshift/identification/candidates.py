@@ -50,6 +50,8 @@ class Candidate:
     """Leaks that are tried [counts a step]."""
     note: str = ""
     """What it stands for, in a few words."""
+    statistic: AnyStatistic | None = None
+    """What says those values step by step; None: they come of whole recordings alone."""
 
     @property
     def alphas(self) -> Float[np.ndarray, " A"]:
@@ -66,6 +68,7 @@ def _watching(statistic: AnyStatistic, name: str, **settings: Any) -> Candidate:
     """A candidate whose numbers are a statistic's, step by step."""
     return Candidate(
         name=name,
+        statistic=statistic,
         values=lambda recording: recording.values(statistic),
         unit=statistic.unit,
         needs=statistic.needs,

@@ -1,20 +1,42 @@
 """Chatter: how often robots would have shifted, there and back, by two rules in turn."""
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.identification.recording import Recording
-from gaitshift.switching import Rule, load_condition
+from gaitshift.identification.grid import first_firings
+from gaitshift.identification.recording import Recording, Way
+from gaitshift.switching import AnyStatistic, Condition, Rule, Signals, load_condition
 
 SHIPPED = "touchdown_surprise"
 """The condition whose way back, or way there, stands in for the one that is not judged."""
 
 
-def shipped_values(recording: Recording, *, back: bool) -> Float[np.ndarray, "T N M"]:
-    """What the shipped condition watches on a recording, on the way there or back."""
-    condition = load_condition(SHIPPED)
-    watched = condition.statistic_back if back else None
-    return recording.values(watched or condition.statistic)
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Said:
+    """A statistic whose numbers were known before, step by step: what it says forgets nothing."""
+
+    values: Float[np.ndarray, "T N M"]
+    """Of all steps."""
+
+    unit = ""
+    needs = ()
+
+    @property
+    def width(self) -> int:
+        """M."""
+        return self.values.shape[2]
+
+    def start(self, n: int) -> int:
+        """The first step."""
+        del n
+        return 0
+
+    def step(self, state: int, signals: Signals) -> tuple[int, Float[np.ndarray, "N M"]]:
+        """The next step, and what was known of this one."""
+        del signals
+        return state + 1, self.values[state]
 
 
 def shipped_rule(*, back: bool) -> Rule:
@@ -23,33 +45,45 @@ def shipped_rule(*, back: bool) -> Rule:
     return condition.flat if back else condition.rough
 
 
-def shifts(
-    there: tuple[Rule, Float[np.ndarray, "T N M"]],
-    back: tuple[Rule, Float[np.ndarray, "T N L"]],
-    alive: Bool[np.ndarray, "T N"],
-) -> Int[np.ndarray, " N"]:
-    """How often each robot shifts, there and back taken together.
+def in_turn(rule: Rule, statistic: AnyStatistic, way: Way) -> Condition:
+    """A condition of this rule on this way, and of the shipped one's on the other."""
+    shipped = load_condition(SHIPPED)
+    if way == "rough":
+        return replace(
+            shipped,
+            statistic=statistic,
+            statistic_back=shipped.statistic_back or shipped.statistic,
+            alpha=rule.alpha,
+            beta=rule.beta,
+            leak=rule.leak,
+        )
+    return replace(
+        shipped,
+        statistic_back=statistic,
+        alpha_back=rule.alpha,
+        beta_back=rule.beta,
+        leak_back=rule.leak,
+    )
 
-    All begin in the gait for flat ground. Each rule counts what belongs to it from k = 0 when it
-    comes into force, as in `Condition.step`. A robot that has fallen shifts no more.
 
-    Args:
-        there: the rule to the rough gait, and what it watches.
-        back: the rule of the way back, and what it watches.
-        alive: whether robots are on their feet.
+def shifts(recording: Recording, condition: Condition) -> Int[np.ndarray, " N"]:
+    """How often each robot would have shifted, there and back taken together.
+
+    All begin in the gait for flat ground. A robot that has fallen shifts no more.
     """
-    grown = np.stack([_growth(*there), _growth(*back)])
-    betas = np.array([there[0].beta, back[0].beta])
-    n: int = alive.shape[1]
-    robots = np.arange(n)
-    k, count = np.zeros(n), np.zeros(n, dtype=np.int64)
-    for t in range(len(alive)):
-        in_force = count % 2
-        k = np.maximum(k + grown[in_force, t, robots], 0.0)
-        fires = alive[t] & (k > betas[in_force])
-        k[fires] = 0.0
-        count += fires
+    n = recording.robots
+    state, count = condition.start(n), np.zeros(n, dtype=np.int64)
+    for alive, signals in zip(recording.alive, recording, strict=True):
+        state, fires = condition.step(state, signals, count % 2 == 1)
+        count += fires & alive
     return count
+
+
+def ever_fires(recording: Recording, rule: Rule, values: Float[np.ndarray, "T N M"]) -> bool:
+    """Whether any robot fires a rule: where none does on the way there, none ever shifts."""
+    alpha, beta = np.array([rule.alpha]), np.array([rule.beta])
+    first = first_firings(values, recording.alive, rule, alpha, beta)
+    return bool((first < len(recording.time)).any())
 
 
 def chattered(recording: Recording, count: Int[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
@@ -62,10 +96,3 @@ def chattered(recording: Recording, count: Int[np.ndarray, " N"]) -> Bool[np.nda
     begun = rough & ~np.roll(rough, 1, axis=0)
     begun[0] = rough[0]
     return count > 2 * np.maximum(begun.sum(axis=0), 1)
-
-
-def _growth(rule: Rule, values: Float[np.ndarray, "T N M"]) -> Float[np.ndarray, "T N"]:
-    """What k gains in each step, before it is kept from falling below 0."""
-    steps, robots, width = values.shape
-    counts = rule.count(values.reshape(steps * robots, width)).reshape(steps, robots)
-    return rule.epsilon * counts - rule.leak

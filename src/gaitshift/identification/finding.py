@@ -8,7 +8,13 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.identification.candidates import BETAS, Candidate
-from gaitshift.identification.chatter import chattered, shifts, shipped_rule, shipped_values
+from gaitshift.identification.chatter import (
+    Said,
+    chattered,
+    ever_fires,
+    in_turn,
+    shifts,
+)
 from gaitshift.identification.choice import Choice, choose
 from gaitshift.identification.facing import facing
 from gaitshift.identification.grid import first_firings, steps_alive
@@ -225,26 +231,23 @@ def judge(
         steps = steps_alive(recording.alive)
         way += float(recording.distance[steps - 1, np.arange(recording.robots)].sum())
         time += float(steps.sum()) * recording.period
-        other: dict[bool, np.ndarray] = {}
         for one in tuned:
-            name, rule, back = one.candidate.name, one.rule, one.way == "flat"
+            name, rule = one.candidate.name, one.rule
             if missing := one.candidate.missing(recording):
                 raise GaitshiftError(
                     f"{recording.name} lacks signals of '{name}': it needs {', '.join(missing)}"
                 )
             values = one.candidate.values(recording)
-            if back not in other:
-                other[back] = shipped_values(recording, back=not back)
             seen, faced = facing(recording, values, one.way)
             course = courses[name].setdefault(
                 seen.name, OnCourse(course=seen.name, tally=Tally(shape=(1, 1)))
             )
             _add(course, one, seen, faced)
-            pair = [(rule, values), (shipped_rule(back=not back), other[back])]
-            there, home = reversed(pair) if back else pair
-            count = shifts(there, home, recording.alive)
-            course.shifts += int(count.sum())
-            course.chattered += int(chattered(recording, count).sum())
+            if one.way == "flat" or ever_fires(recording, rule, values):
+                watched = one.candidate.statistic or Said(values=values)
+                count = shifts(recording, in_turn(rule, watched, one.way))
+                course.shifts += int(count.sum())
+                course.chattered += int(chattered(recording, count).sum())
             width, period = values.shape[2], recording.period
             soonest[name] = rule.soonest(width, period)
             least = one.area_rule.soonest(width, period)

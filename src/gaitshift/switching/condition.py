@@ -14,7 +14,7 @@ from gaitshift.switching.height_difference import HeightDifference
 from gaitshift.switching.modulation import Modulation
 from gaitshift.switching.rule import Rule
 from gaitshift.switching.signals import Signals
-from gaitshift.switching.statistic import AnyStatistic
+from gaitshift.switching.statistic import AnyStatistic, begun_anew
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,8 +67,8 @@ class Condition:
     hold: float = 0.0
     """Least time in either gait [s]; ours, the paper has none."""
     reset: bool = True
-    """Whether k returns to 0 on firing; ours: the rule now in force would start from the count of
-    the other."""
+    """Whether a robot begins anew on firing, with k at 0 and nothing remembered; ours: the rule now
+    in force would start from the count of the other, and from what the old gait's touches said."""
     modulation: Modulation | None = None
     """How α and α' follow time or speed; None: not at all."""
 
@@ -155,6 +155,10 @@ class Condition:
             shifted, flat.step(state.k, values_back, factor), rough.step(state.k, values, factor)
         )
         fire = np.where(shifted, flat.fires(k, time), rough.fires(k, time))
+        if self.reset:
+            memory = begun_anew(self.statistic, memory, fire)
+            if self.statistic_back is not None:
+                memory_back = begun_anew(self.statistic_back, memory_back, fire)
         after = ConditionState(
             statistic=memory,
             statistic_back=memory_back,

@@ -57,7 +57,7 @@ class GaitGraph:
     edges: tuple[Edge, ...]
     """The ways."""
     reset: bool = True
-    """Whether the counters of a robot return to 0 when it shifts."""
+    """Whether a robot that shifts begins anew: counters at 0, nothing remembered of the ground."""
 
     def __post_init__(self) -> None:
         if not self.edges:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.switching.signals import Signals
@@ -21,14 +21,14 @@ class HeadingState:
 
 @dataclass(frozen=True, kw_only=True)
 class HeadingWatch:
-    """Follows heading and yaw rate, and says who is thrown off them.
+    """Follows heading and yaw rate, and says how far robots are off them.
 
     A critically damped follower of second order (an α-β filter): steady turns leave no error.
     """
 
     limit: float = 0.08
-    """Further off than this is thrown off [rad]; ours: on `perlin:0.20` the trot is off by less
-    than 0.05 in all but one step of a thousand, who stumbles at a step by 0.12 and more."""
+    """Who is further off than this is thrown off [rad]; ours: on `perlin:0.20` the trot is off by
+    less than 0.05 in all but one step of a thousand, who stumbles at a step by 0.12 and more."""
     frequency: float = 2.0
     """How fast it follows [rad/s]."""
 
@@ -42,10 +42,10 @@ class HeadingWatch:
 
     def step(
         self, state: HeadingState, signals: Signals
-    ) -> tuple[HeadingState, Bool[np.ndarray, " N"]]:
-        """The heading after this step, and whose is off it; nobody's where no yaw is given."""
+    ) -> tuple[HeadingState, Float[np.ndarray, " N"]]:
+        """The heading after this step, and how far off each is [rad]; 0 where no yaw is given."""
         if signals.yaw is None:
-            return state, np.zeros(len(state.yaw), dtype=bool)
+            return state, np.zeros(len(state.yaw))
         period = signals.period
         kept = np.exp(-self.frequency * period)
         expected = np.where(np.isnan(state.yaw), signals.yaw, state.yaw + state.rate * period)
@@ -54,4 +54,4 @@ class HeadingWatch:
             yaw=expected + (1.0 - kept * kept) * off,
             rate=state.rate + (1.0 - kept) ** 2 / period * off,
         )
-        return after, np.abs(off) > self.limit
+        return after, off

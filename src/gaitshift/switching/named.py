@@ -37,8 +37,9 @@ CONDITIONS: dict[str, Condition] = {
     # Numbers of `gaitshift identify` (docs/results/shifting).
     "touchdown_surprise": Condition(
         statistic=TouchdownSurprise(),
-        alpha=0.029,
-        beta=10.0,
+        alpha=0.0158,
+        beta=13.0,
+        leak=0.3,
         statistic_back=HeightDifference(),
         alpha_back=0.0055,
         beta_back=18.0,

@@ -1,10 +1,11 @@
 """What conditions watch: a few numbers a step and robot, which grow with the ground's roughness."""
 
 import math
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, Protocol, TypeVar, cast, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.switching.signals import Signals
@@ -54,3 +55,22 @@ def check_positive(statistic: object, *names: str) -> None:
 
 AnyStatistic = Statistic[Any]
 """Where several kinds of statistic are handled alike."""
+
+
+def begun_anew(statistic: AnyStatistic, state: Any, who: Bool[np.ndarray, " N"]) -> Any:
+    """What a statistic remembers, with nothing of the robots `who`: they were not seen yet."""
+    return _chosen(who, statistic.start(len(who)), state) if who.any() else state
+
+
+def _chosen(who: Bool[np.ndarray, " N"], ours: Any, others: Any) -> Any:
+    """Rows of `ours` where `who`, of `others` elsewhere, in all arrays of two states."""
+    state: Any = others
+    if is_dataclass(others):
+        names = [f.name for f in fields(others)]
+        rows = {name: _chosen(who, getattr(ours, name), getattr(others, name)) for name in names}
+        return replace(cast(Any, others), **rows)
+    if not isinstance(ours, np.ndarray):
+        return state
+    chosen: Any = np.array(state)
+    chosen[who] = ours[who]
+    return chosen

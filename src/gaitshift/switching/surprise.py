@@ -20,6 +20,20 @@ AHEAD = 0.1
 RIDGE = 0.02
 """[m²]: a plane through touches that are near one line does not tilt across it at will."""
 
+LAGS = (1, 3)
+"""An error is held against the one before it, and the one three before it: of a trot's front feet,
+which take turns, against the other foot half a stride and one and a half strides ago."""
+
+SHARES = (0.85, 0.15)
+"""Powers of their deviations in the mean; noise differs most at the longer lag, slopes and steps
+least at the shorter one; ours, from a plateau of 0.1 to 0.2."""
+
+STEADY = 0.006
+"""A body that is off its heading by less than this [rad] keeps to it; ours, a trot's on flat."""
+
+ASIDE_WINDOW = 0.5
+"""How far it is off is a root mean square that forgets by e in this time [s]."""
+
 _HEADING = HeadingWatch()
 
 
@@ -31,8 +45,12 @@ class SurpriseState:
     """The touches of all feet."""
     heading: HeadingState
     """The heading that the robot keeps to."""
-    error: Float[np.ndarray, "N J"]
-    """The last errors, the last first [m]; NaN before that: one more than the changes."""
+    aside: Float[np.ndarray, " N"]
+    """Mean square of how far it is off that [rad²]."""
+    error: Float[np.ndarray, "N 4"]
+    """The last errors, the last first [m]; NaN before that."""
+    square: Float[np.ndarray, "N 2"]
+    """Means of half the squares of their changes over each of `LAGS` [m²]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,18 +60,22 @@ class TouchdownSurprise:
     Each foot that comes down on new ground, ahead of all earlier touches, is held against the plane
     through those, along the vertical: that is its error. A slope has none; where it begins errors
     grow and fade, and from one touchdown to the next they change little; a single step changes them
-    once; noise changes them at each touchdown. The number is the larger of two estimates of the
-    errors' own deviation that a drift does not disturb: root mean squares of their changes over √2
-    (von Neumann 1941), and of the changes of those over √6. Feet that come down where others stood
-    before say nothing new, and do not count. A robot that stumbles is thrown off its heading, and
-    odometry by its feet is worth nothing then: all is forgotten, and nothing said until there are
-    errors enough again.
+    once; noise changes them at each touchdown. Root mean squares of their changes, over √2 (von
+    Neumann 1941), are the errors' own deviation where they know nothing of one another, and a drift
+    disturbs them little. The number is the geometric mean of two of them, over the last change and
+    over three touchdowns (`LAGS`, `SHARES`). Means start at 0: what was not seen is smooth. Feet
+    that come down where others stood before say nothing new, and do not count.
+
+    Odometry by the feet is worth the less the more the body is turned aside, as at the edge of a
+    step or a bend: the number is divided by how many times further than `STEADY` the robot is off
+    its heading. One that is thrown off it altogether stumbles: all is forgotten, and nothing said
+    until there are errors enough again. Where no yaw is given, neither is done.
     """
 
     touches: int = 3
     """Touches of each foot that the plane goes through."""
-    memory: int = 6
-    """Changes that the mean is over."""
+    memory: float = 10.0
+    """Touchdowns on new ground in which the means forget by e; 1: the last change alone."""
     least_swing: float = 0.05
     """A foot that comes down again sooner has bounced: it is the same touch [s]."""
 
@@ -63,8 +85,8 @@ class TouchdownSurprise:
 
     def __post_init__(self) -> None:
         _ = self._memory
-        if not 1 <= self.memory <= 1000:
-            raise GaitshiftError(f"memory = {self.memory}: 1 to 1000 changes would be right")
+        if not 1.0 <= self.memory <= 1000.0:
+            raise GaitshiftError(f"memory = {self.memory:g}: 1 to 1000 touchdowns would be right")
 
     @cached_property
     def _memory(self) -> Touches:
@@ -75,7 +97,9 @@ class TouchdownSurprise:
         return SurpriseState(
             touches=self._memory.start(n),
             heading=_HEADING.start(n),
-            error=np.full((n, self.memory + 1), np.nan),
+            aside=np.zeros(n),
+            error=np.full((n, 1 + max(LAGS)), np.nan),
+            square=np.zeros((n, len(LAGS))),
         )
 
     def step(
@@ -83,45 +107,64 @@ class TouchdownSurprise:
     ) -> tuple[SurpriseState, Float[np.ndarray, "N 1"]]:
         """Errors after this step, and what their changes come to; NaN until there are enough."""
         touches, new, foot = self._memory.step(state.touches, signals)
-        heading, stumbles = _HEADING.step(state.heading, signals)
-        error = state.error
+        heading, off = _HEADING.step(state.heading, signals)
+        share = min(1.0, signals.period / ASIDE_WINDOW)
+        aside = state.aside + share * (off * off - state.aside)
+        error, square = state.error, state.square
         ids = np.flatnonzero(new.any(axis=1))
         if ids.size:
-            error = error.copy()
-            error[ids] = self._take_in(error[ids], state.touches, touches, new, foot, ids)
-        if stumbles.any():
-            touch = np.where(stumbles[:, None, None, None], np.nan, touches.touch)
+            error, square = error.copy(), square.copy()
+            above, counts = _met(state.touches, touches, new, foot, ids)
+            error[ids], square[ids] = self._take_in(error[ids], square[ids], above, counts)
+        thrown = np.abs(off) > _HEADING.limit
+        if thrown.any():
+            touch = np.where(thrown[:, None, None, None], np.nan, touches.touch)
             touches = replace(touches, touch=touch)
-            error = np.where(stumbles[:, None], np.nan, error)
-        change = error[:, :-1] - error[:, 1:]
-        deviation = np.sqrt(np.mean(change * change, axis=1) / 2.0)
-        if self.memory > 1:
-            change = change[:, :-1] - change[:, 1:]
-            deviation = np.maximum(deviation, np.sqrt(np.mean(change * change, axis=1) / 6.0))
-        return SurpriseState(touches=touches, heading=heading, error=error), deviation[:, None]
+            error = np.where(thrown[:, None], np.nan, error)
+            square = np.where(thrown[:, None], 0.0, square)
+        deviation = np.prod(np.sqrt(square) ** np.array(SHARES), axis=1)
+        value = deviation / np.maximum(np.sqrt(aside) / STEADY, 1.0)
+        known = ~np.isnan(error[:, -1])
+        after = SurpriseState(
+            touches=touches, heading=heading, aside=aside, error=error, square=square
+        )
+        return after, np.where(known, value, np.nan)[:, None]
 
     def _take_in(
         self,
-        error: Float[np.ndarray, "K J"],
-        before: TouchState,
-        after: TouchState,
-        new: Bool[np.ndarray, "N 4"],
-        foot: Float[np.ndarray, "N 4 3"],
-        ids: np.ndarray,
-    ) -> Float[np.ndarray, "K J"]:
-        """The errors of robots `ids`, some of whose feet came down, with the new ones in front."""
-        points, came = before.points[ids], foot[ids]
-        known = ~np.isnan(points[..., 0])
-        plane = fit_plane(points, known, RIDGE)
-        above = plane.above(came)
-        way = after.odometry.base[ids, :2] - plane.middle[:, :2]
-        way = way / np.maximum(np.hypot(way[:, :1], way[:, 1:]), 1e-9)
-        ahead = _along(came, way) + AHEAD > _furthest(_along(points, way), known)[:, None]
-        counts = new[ids] & ahead & (known.sum(axis=1) >= LEAST)[:, None]
+        error: Float[np.ndarray, "K 4"],
+        square: Float[np.ndarray, "K 2"],
+        above: Float[np.ndarray, "K 4"],
+        counts: Bool[np.ndarray, "K 4"],
+    ) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, "K 2"]]:
+        """Errors and means after the feet that count, `above` [m] where they were expected."""
         for leg in range(4):
+            change = above[:, leg, None] - error[:, [lag - 1 for lag in LAGS]]
+            taken = counts[:, leg, None] & ~np.isnan(change)
+            square = np.where(taken, square + (change**2 / 2.0 - square) / self.memory, square)
             shifted = np.concatenate([above[:, leg, None], error[:, :-1]], axis=1)
             error = np.where(counts[:, leg, None], shifted, error)
-        return error
+        return error, square
+
+
+def _met(
+    before: TouchState,
+    after: TouchState,
+    new: Bool[np.ndarray, "N 4"],
+    foot: Float[np.ndarray, "N 4 3"],
+    ids: np.ndarray,
+) -> tuple[Float[np.ndarray, "K 4"], Bool[np.ndarray, "K 4"]]:
+    """How far above the earlier touches' plane robots `ids` have their feet [m], and which count.
+
+    Those do that came down on new ground, where enough earlier touches are known.
+    """
+    points, came = before.points[ids], foot[ids]
+    known = ~np.isnan(points[..., 0])
+    plane = fit_plane(points, known, RIDGE)
+    way = after.odometry.base[ids, :2] - plane.middle[:, :2]
+    way = way / np.maximum(np.hypot(way[:, :1], way[:, 1:]), 1e-9)
+    ahead = _along(came, way) + AHEAD > _furthest(_along(points, way), known)[:, None]
+    return plane.above(came), new[ids] & ahead & (known.sum(axis=1) >= LEAST)[:, None]
 
 
 def _along(

@@ -14,7 +14,7 @@ from gaitshift.switching.controller import Controller
 from gaitshift.switching.graph import GaitGraph
 from gaitshift.switching.height_difference import HeightDifference
 from gaitshift.switching.signals import Signals
-from gaitshift.switching.statistic import AnyStatistic
+from gaitshift.switching.statistic import AnyStatistic, begun_anew
 
 _ROUNDING = 1e-9
 """Times are multiples of 10 ms, give or take this [s]."""
@@ -60,9 +60,9 @@ class Autonomous:
         self.graph = graph
         self._sees = sees
         self._statistics: dict[str, AnyStatistic] = {**graph.statistics}
-        heights = [k for k, s in self._statistics.items() if isinstance(s, HeightDifference)]
-        self._heights = heights[0] if heights else "h, for logs"
-        self._statistics.setdefault(self._heights, HeightDifference())
+        heights = [s for s in self._statistics.values() if isinstance(s, HeightDifference)]
+        self._logged = heights[0] if heights else HeightDifference()
+        self._height = self._logged.start(n)
         self._asks_critic = any("value" in s.needs for s in self._statistics.values())
         self._memory: dict[str, Any] = {k: s.start(n) for k, s in self._statistics.items()}
         self._k = np.zeros((n, len(graph.edges)))
@@ -90,6 +90,7 @@ class Autonomous:
         values: dict[str, np.ndarray] = {}
         for name, statistic in self._statistics.items():
             self._memory[name], values[name] = statistic.step(self._memory[name], signals)
+        self._height, _ = self._logged.step(self._height, signals)
         self._time_in_gait = self._time_in_gait + signals.period
         decision, fire = self._count(signals, values, driver)
         self._shift(fire, motion, driver)
@@ -112,7 +113,7 @@ class Autonomous:
             closer = here & (near > nearest)
             nearest[closer] = near[closer]
             k[closer], threshold[closer] = counted[closer], edge.rule.beta
-        height = np.nan_to_num(self._memory[self._heights])  # of feet that never touched: 0
+        height = np.nan_to_num(self._height)  # of feet that never touched: 0
         return Decision(k=k, threshold=threshold, foot_height=height), fire
 
     def _shift(self, fire: Bool[np.ndarray, "N E"], motion: Motion, driver: Controller) -> None:
@@ -126,6 +127,9 @@ class Autonomous:
             free &= ~takes
             # the edges of the new gait start anew or, as there is one k in the paper, go on from it
             self._k[takes] = 0.0 if self.graph.reset else self._k[takes, index, None]
+        if self.graph.reset:
+            for name, statistic in self._statistics.items():
+                self._memory[name] = begun_anew(statistic, self._memory[name], ~free)
         self._time_in_gait[~free] = 0.0
 
 
