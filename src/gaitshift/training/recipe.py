@@ -93,7 +93,7 @@ class Recipe:
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """The algorithm."""
     stages: tuple[Stage, ...] = (
-        Stage(name="flat", iterations=350),
+        Stage(name="flat", iterations=450),
         Stage(
             name="rough",
             iterations=470,
