@@ -51,7 +51,7 @@ def build_condition(gui: Any, orders: Orders, live: LiveRun) -> None:
     now = next((name for name in names if CONDITIONS[name] == condition), names[0])
     name = gui.add_dropdown("condition", names, initial_value=now)
     ranges = {
-        "alpha": ("α [m]", 0.001, 0.3, 0.001),
+        "alpha": ("α [m]", 0.001, 0.3, 0.0002),
         "beta": ("β [counts]", 0, 1500, 1),
         "leak": ("leak [counts/step]", 0, 6, 0.01),
         "alpha_back": ("α' [m]", 0.001, 0.3, 0.0005),
