@@ -33,7 +33,7 @@ from gaitshift.switching import (
 )
 from gaitshift.switching.heading import HeadingWatch
 from gaitshift.switching.plane import deviation
-from gaitshift.switching.surprise import STEADY
+from gaitshift.switching.surprise import STEADY, STEEP
 from turning import rotation
 
 quick = settings(max_examples=60, deadline=None)
@@ -371,6 +371,22 @@ def test_where_a_slope_begins_touches_surprise_less_than_a_step_of_its_rise_in_a
     step = course(TouchdownSurprise(), lambda x, y: 0.1 * (x > 2.0), **walk)
     assert np.nanmax(bend) < 0.7 * np.nanmax(step)
     assert np.nan_to_num(bend)[-50:].max() < 0.002, "a slope by itself is no surprise"
+
+
+def test_what_lies_on_steep_ground_counts_less_by_how_steep_it_is():
+    """Tilting the ground changes no error; 10° are steeper than `STEEP` by tan 10° over it."""
+    heights = np.random.default_rng(5).normal(scale=0.01, size=(400, 41))
+    walk = {"turn": 0.0, "wobble": 0.0, "seconds": 18.0}
+    rise = math.tan(math.radians(10.0))
+
+    def told(slope):
+        def pebbles(x, y):
+            return heights[int(20 * x + 20), int(20 * y + 20)] + slope * x
+
+        return np.nanmean(course(TouchdownSurprise(), pebbles, **walk)[600:])
+
+    assert told(rise) == pytest.approx(told(0.0) * STEEP / rise, rel=0.15)
+    assert told(0.5 * STEEP) == pytest.approx(told(0.0), rel=0.15)
 
 
 def test_on_heights_that_know_nothing_of_one_another_it_is_their_deviation():

@@ -31,9 +31,11 @@ def _smooth() -> tuple[Course, ...]:
     steps, stairs = ",".join(["step:0.05@6"] * 5), ",".join(["stairs:0.05@9"] * 4)
     return (
         Course(name="flat", terrain="flat"),
-        Course(name="up-10", terrain="flat@4,slope:10@30"),
-        Course(name="down-10", terrain="flat@4,slope:-10@30"),
-        Course(name="up-15", terrain="flat@4,slope:15@30"),
+        *(
+            Course(name=f"{way}-{degrees}", terrain=f"flat@4,slope:{sign}{degrees}@8,flat@20")
+            for degrees in (10, 15)
+            for way, sign in (("up", ""), ("down", "-"))
+        ),
         Course(name="across-10", terrain="bank:10"),
         Course(name="steps-5cm", terrain=f"flat@4,{steps}"),
         Course(name="stairs-5cm", terrain=f"flat@4,{stairs}"),

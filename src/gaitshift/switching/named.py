@@ -38,8 +38,7 @@ CONDITIONS: dict[str, Condition] = {
     "touchdown_surprise": Condition(
         statistic=TouchdownSurprise(),
         alpha=0.0158,
-        beta=13.0,
-        leak=0.3,
+        beta=15.0,
         statistic_back=HeightDifference(),
         alpha_back=0.0055,
         beta_back=18.0,

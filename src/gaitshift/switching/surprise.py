@@ -26,12 +26,18 @@ which take turns, against the other foot half a stride and one and a half stride
 
 SHARES = (0.85, 0.15)
 """Powers of their deviations in the mean; noise differs most at the longer lag, slopes and steps
-least at the shorter one; ours, from a plateau of 0.1 to 0.2."""
+least at the shorter one; ours, from a plateau of 0.1 to 0.15."""
 
-STEADY = 0.006
+STEEP = 0.08
+"""Rise over run from which ground is steep: a slope of 5°; ours, noise of 10 cm seldom is."""
+
+STEEP_FOR = 15.0
+"""Touchdowns in which steep ground is forgotten by e."""
+
+STEADY = 0.0055
 """A body that is off its heading by less than this [rad] keeps to it; ours, a trot's on flat."""
 
-ASIDE_WINDOW = 0.5
+ASIDE_WINDOW = 1.0
 """How far it is off is a root mean square that forgets by e in this time [s]."""
 
 _HEADING = HeadingWatch()
@@ -51,6 +57,8 @@ class SurpriseState:
     """The last errors, the last first [m]; NaN before that."""
     square: Float[np.ndarray, "N 2"]
     """Means of half the squares of their changes over each of `LAGS` [m²]."""
+    steep: Float[np.ndarray, " N"]
+    """Rise over run of the steepest of the last planes, the less the longer ago."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,10 +74,12 @@ class TouchdownSurprise:
     over three touchdowns (`LAGS`, `SHARES`). Means start at 0: what was not seen is smooth. Feet
     that come down where others stood before say nothing new, and do not count.
 
-    Odometry by the feet is worth the less the more the body is turned aside, as at the edge of a
-    step or a bend: the number is divided by how many times further than `STEADY` the robot is off
-    its heading. One that is thrown off it altogether stumbles: all is forgotten, and nothing said
-    until there are errors enough again. Where no yaw is given, neither is done.
+    Two things make it smaller. Where the ground was steep, its end is to be expected: the number is
+    divided by how many times steeper than `STEEP` the plane was of late. And odometry by the feet
+    is worth the less the more the body is turned aside, as at the edge of a step: it is divided by
+    how many times further than `STEADY` the robot is off its heading. One that is thrown off it
+    altogether stumbles: all is forgotten, and nothing said until there are errors enough again.
+    Where no yaw is given, neither of the last two is done.
     """
 
     touches: int = 3
@@ -100,6 +110,7 @@ class TouchdownSurprise:
             aside=np.zeros(n),
             error=np.full((n, 1 + max(LAGS)), np.nan),
             square=np.zeros((n, len(LAGS))),
+            steep=np.zeros(n),
         )
 
     def step(
@@ -110,23 +121,33 @@ class TouchdownSurprise:
         heading, off = _HEADING.step(state.heading, signals)
         share = min(1.0, signals.period / ASIDE_WINDOW)
         aside = state.aside + share * (off * off - state.aside)
-        error, square = state.error, state.square
+        error, square, steep = state.error, state.square, state.steep
         ids = np.flatnonzero(new.any(axis=1))
         if ids.size:
-            error, square = error.copy(), square.copy()
-            above, counts = _met(state.touches, touches, new, foot, ids)
+            error, square, steep = error.copy(), square.copy(), steep.copy()
+            above, slope, counts = _met(state.touches, touches, new, foot, ids)
             error[ids], square[ids] = self._take_in(error[ids], square[ids], above, counts)
+            met = counts.sum(axis=1)
+            kept = np.exp(-met / STEEP_FOR) * steep[ids]
+            steep[ids] = np.where(met > 0, np.maximum(slope, kept), steep[ids])
         thrown = np.abs(off) > _HEADING.limit
         if thrown.any():
             touch = np.where(thrown[:, None, None, None], np.nan, touches.touch)
             touches = replace(touches, touch=touch)
             error = np.where(thrown[:, None], np.nan, error)
             square = np.where(thrown[:, None], 0.0, square)
+            steep = np.where(thrown, 0.0, steep)
         deviation = np.prod(np.sqrt(square) ** np.array(SHARES), axis=1)
-        value = deviation / np.maximum(np.sqrt(aside) / STEADY, 1.0)
+        aside_by = np.maximum(np.sqrt(aside) / STEADY, 1.0)
+        value = deviation / aside_by / np.maximum(steep / STEEP, 1.0)
         known = ~np.isnan(error[:, -1])
         after = SurpriseState(
-            touches=touches, heading=heading, aside=aside, error=error, square=square
+            touches=touches,
+            heading=heading,
+            aside=aside,
+            error=error,
+            square=square,
+            steep=steep,
         )
         return after, np.where(known, value, np.nan)[:, None]
 
@@ -153,10 +174,11 @@ def _met(
     new: Bool[np.ndarray, "N 4"],
     foot: Float[np.ndarray, "N 4 3"],
     ids: np.ndarray,
-) -> tuple[Float[np.ndarray, "K 4"], Bool[np.ndarray, "K 4"]]:
-    """How far above the earlier touches' plane robots `ids` have their feet [m], and which count.
+) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, " K"], Bool[np.ndarray, "K 4"]]:
+    """Robots `ids` against the plane of their earlier touches.
 
-    Those do that came down on new ground, where enough earlier touches are known.
+    How far above it their feet are [m], its rise over run, and which feet count: those do that came
+    down on new ground, where enough earlier touches are known.
     """
     points, came = before.points[ids], foot[ids]
     known = ~np.isnan(points[..., 0])
@@ -164,7 +186,8 @@ def _met(
     way = after.odometry.base[ids, :2] - plane.middle[:, :2]
     way = way / np.maximum(np.hypot(way[:, :1], way[:, 1:]), 1e-9)
     ahead = _along(came, way) + AHEAD > _furthest(_along(points, way), known)[:, None]
-    return plane.above(came), new[ids] & ahead & (known.sum(axis=1) >= LEAST)[:, None]
+    counts = new[ids] & ahead & (known.sum(axis=1) >= LEAST)[:, None]
+    return plane.above(came), np.hypot(*plane.slope.T), counts
 
 
 def _along(
