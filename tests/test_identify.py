@@ -9,12 +9,13 @@ import pytest
 
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
-from gaitshift.identification import Recording, auc
+from gaitshift.identification import Recording, auc, sources
 from gaitshift.identification.candidates import CANDIDATES
 from gaitshift.identification.classifier import RoughnessClassifier
-from gaitshift.identification.finding import as_given, judge, tune
+from gaitshift.identification.judging import judge, replay_rules
 from gaitshift.identification.passage import passage_scores
 from gaitshift.identification.statistics import auc_interval
+from gaitshift.identification.tuning import as_given, try_grids, tune
 from gaitshift.legs import LEGS
 from gaitshift.switching import Rule
 
@@ -60,6 +61,14 @@ def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
     )
 
 
+def tuned_by(candidates, recordings, way):
+    return tune(candidates, try_grids(candidates, recordings, way))
+
+
+def judged_by(tuned, recordings):
+    return judge(tuned, replay_rules(tuned, recordings))
+
+
 def ways():
     return [march("flat", noise=0.0), march("into", noise=0.04, seed=1)]
 
@@ -82,8 +91,8 @@ def time_to_fire(tuned):
 
 def test_numbers_that_are_chosen_notice_noise_and_keep_still_on_smooth_ground():
     """Touches differ by 2 mm at most on smooth ground, by 8 cm on rough: α lies in between."""
-    tuned = tune(height_candidates(), ways, way="rough")
-    for one, judged in zip(tuned, judge(tuned, ways), strict=True):
+    tuned = tuned_by(height_candidates(), ways(), way="rough")
+    for one, judged in zip(tuned, judged_by(tuned, ways()), strict=True):
         assert one.choice.is_free
         tallies = {course.course: course.tally for course in judged.courses}
         assert tallies["flat"].fired[0, 0] == 0
@@ -102,8 +111,8 @@ def test_numbers_that_are_chosen_notice_noise_and_keep_still_on_smooth_ground():
 
 def test_judging_replays_what_a_live_condition_does():
     """The delays of the report are those of the rule itself, step by step."""
-    (tuned,) = tune(height_candidates()[:1], ways, way="rough")
-    (judged,) = judge([tuned], ways)
+    (tuned,) = tuned_by(height_candidates()[:1], ways(), way="rough")
+    (judged,) = judged_by([tuned], ways())
     recording = ways()[1]
     values, rule = tuned.candidate.values(recording), tuned.rule
     expected = []
@@ -119,15 +128,15 @@ def test_judging_replays_what_a_live_condition_does():
 
 
 def test_numbers_that_are_given_are_judged_as_those_that_are_chosen():
-    tuned = tune(height_candidates()[:1], ways, way="rough")
+    tuned = tuned_by(height_candidates()[:1], ways(), way="rough")
     chosen = tuned[0].choice
     numbers = {"alpha": chosen.alpha, "beta": chosen.beta, "leak": chosen.leak}
     given = as_given(height_candidates()[:1], way="rough", **numbers)
-    by_choice, by_hand = (judge(those, ways)[0].courses for those in (tuned, given))
+    by_choice, by_hand = (judged_by(those, ways())[0].courses for those in (tuned, given))
     assert [c.delays_m for c in by_hand] == [c.delays_m for c in by_choice]
     assert by_hand[1].tally.detected[0, 0] == 3
     # No two of the feet differ by 20 cm where the noise is of 4 cm.
-    (far,) = judge(as_given(height_candidates()[:1], way="rough", alpha=0.2, beta=0.0), ways)
+    (far,) = judged_by(as_given(height_candidates()[:1], way="rough", alpha=0.2, beta=0.0), ways())
     assert far.courses[1].tally.came[0, 0] == 3
     assert far.courses[1].tally.detected[0, 0] == 0
 
@@ -141,9 +150,9 @@ def test_the_way_back_notices_that_rough_ground_has_ended():
     def out():
         return [replace(ahead, **turned)]
 
-    (tuned,) = tune(height_candidates()[:1], out, way="flat")
+    (tuned,) = tuned_by(height_candidates()[:1], out(), way="flat")
     assert tuned.rule.when == "below"
-    (judged,) = judge([tuned], out)
+    (judged,) = judged_by([tuned], out())
     assert judged.courses[0].tally.detected[0, 0] == 3
     assert judged.courses[0].tally.fired[0, 0] == 0
 
@@ -157,15 +166,15 @@ def test_on_the_way_back_an_oracle_notices_the_very_step_in_which_rough_ground_e
     def out():
         return [replace(ahead, **turned)]
 
-    tuned = tune([c for c in CANDIDATES if c.name == "oracle"], out, way="flat")
-    (judged,) = judge(tuned, out)
+    tuned = tuned_by([c for c in CANDIDATES if c.name == "oracle"], out(), way="flat")
+    (judged,) = judged_by(tuned, out())
     assert judged.courses[0].tally.fired[0, 0] == 0
     assert judged.courses[0].delays_m == pytest.approx([0.0] * 3)
 
 
 def test_a_condition_whose_signals_are_missing_is_left_out():
     slip = [c for c in CANDIDATES if c.name in ("slip", "height_difference")]
-    assert [t.candidate.name for t in tune(slip, ways, way="rough")] == ["height_difference"]
+    assert [t.candidate.name for t in tuned_by(slip, ways(), way="rough")] == ["height_difference"]
 
 
 # Passages -----------------------------------------------------------------------------------------
@@ -281,7 +290,98 @@ def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, argument
     assert end.value.code == 2
     error = capsys.readouterr().err.splitlines()[-1]
     assert message in error
-    assert not (tmp_path / "report").exists()
+    made = [path for path in (tmp_path / "report").rglob("*") if "unfinished" not in path.parts]
+    assert not made, "but what was found out of single logs"
+
+
+# Going on -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def two_logs(tmp_path):
+    walks = [march("into", noise=0.04, robots=1), march("into", noise=0.04, robots=1, seed=5)]
+    return [table(tmp_path / f"walk-{i}.csv", walk) for i, walk in enumerate(walks)]
+
+
+def replayed_logs(monkeypatch, killed_at=None):
+    """Files that are replayed from here on, in turn; the process is killed at one of them."""
+    seen = []
+
+    def reading(paths, way):
+        for path in paths:
+            if len(seen) == killed_at:
+                raise KeyboardInterrupt
+            seen.append(path.stem)
+        return sources.recordings(paths, way)
+
+    monkeypatch.setattr("gaitshift.identification.task.recordings", reading)
+    return seen
+
+
+def identify(logs, out, *more):
+    main(["identify", *map(str, logs), "--out", str(out), "--condition", "paper", "oracle", *more])
+
+
+def report_in(folder):
+    return {name: (folder / name).read_text() for name in ("conditions.csv", "courses.csv")}
+
+
+@pytest.mark.parametrize("killed_at", [1, 2, 3])
+def test_a_run_that_was_killed_goes_on_where_it_stopped(
+    tmp_path, monkeypatch, capsys, two_logs, killed_at
+):
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    identify(two_logs, whole)
+    done = replayed_logs(monkeypatch, killed_at)
+    with pytest.raises(SystemExit) as end:
+        identify(two_logs, out)
+    assert end.value.code == 130
+    after = replayed_logs(monkeypatch)
+    capsys.readouterr()
+    identify(two_logs, out)
+    assert [*done, *after] == ["walk-0", "walk-1", "walk-0", "walk-1"], "chosen by, then judged by"
+    assert "choosing: walk-0 (kept)" in capsys.readouterr().err
+    assert report_in(out) == report_in(whole)
+    assert not (out / "unfinished").exists()
+
+
+def test_what_was_kept_of_a_log_is_not_used_for_another_one_of_its_name(
+    tmp_path, monkeypatch, two_logs
+):
+    out = tmp_path / "out"
+    replayed_logs(monkeypatch, killed_at=2)
+    with pytest.raises(SystemExit):
+        identify(two_logs, out)
+    table(two_logs[1], march("into", noise=0.05, robots=1, seed=6))
+    after = replayed_logs(monkeypatch)
+    identify(two_logs, out)
+    assert after == ["walk-1", "walk-0", "walk-1"]
+    whole = tmp_path / "whole"
+    identify(two_logs, whole)
+    assert report_in(out) == report_in(whole)
+
+
+def test_numbers_that_were_kept_are_not_used_for_others(tmp_path, monkeypatch, two_logs):
+    out = tmp_path / "out"
+    replayed_logs(monkeypatch, killed_at=1)
+    with pytest.raises(SystemExit):
+        main(["identify", *map(str, two_logs), "--out", str(out), "--alpha", "0.1", "--beta", "9"])
+    after = replayed_logs(monkeypatch)
+    main(["identify", *map(str, two_logs), "--out", str(out), "--alpha", "0.01", "--beta", "9"])
+    assert after == ["walk-0", "walk-1"]
+
+
+def test_the_classifier_goes_on_too(tmp_path, monkeypatch, two_logs):
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    for folder, killed_at in ((whole, None), (out, 5), (out, None)):
+        seen = replayed_logs(monkeypatch, killed_at)
+        if killed_at is None:
+            identify(two_logs, folder, "classifier")
+        else:
+            with pytest.raises(SystemExit):
+                identify(two_logs, folder, "classifier")
+    assert seen == ["walk-1"], "the last log to be judged by"
+    assert report_in(out) == report_in(whole)
 
 
 def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys):

@@ -14,7 +14,6 @@ from gaitshift.identification import Grid, Tally, choose, passages
 from gaitshift.identification.candidates import BETAS, CANDIDATES
 from gaitshift.identification.chatter import chattered, shifts
 from gaitshift.identification.facing import facing
-from gaitshift.identification.finding import as_given, judge, tune
 from gaitshift.identification.passage import best_beta, passage_grid, passage_scores
 from gaitshift.identification.report import (
     condition_cells,
@@ -23,6 +22,7 @@ from gaitshift.identification.report import (
     course_rows,
     introduction,
 )
+from gaitshift.identification.tuning import as_given
 from gaitshift.plots.identification import condition_map, roc_figure
 from gaitshift.switching import (
     Condition,
@@ -32,7 +32,15 @@ from gaitshift.switching import (
     Rule,
     load_condition,
 )
-from test_identify import height_candidates, march, table, time_to_fire, ways
+from test_identify import (
+    height_candidates,
+    judged_by,
+    march,
+    table,
+    time_to_fire,
+    tuned_by,
+    ways,
+)
 
 
 def crossing(noise=0.04, *, seed=2, robots=3, name="crossing"):
@@ -94,13 +102,13 @@ def test_rough_ground_that_a_table_begins_on_was_not_come_to(tmp_path):
     assert [len(one.time) for one in passages(walk)] == [700, 600]
     assert [len(one.time) for one in passages(walk, "flat")] == [400, 1000]
     noticed_at_once = as_given(height_candidates()[:1], way="rough", alpha=1e-9, beta=0.0)
-    (judged,) = judge(noticed_at_once, lambda: passages(walk))
+    (judged,) = judged_by(noticed_at_once, passages(walk))
     (course,) = judged.courses
     assert course.tally.came.item() == 0, "on smooth ground it has fired before"
     assert course.tally.fired.item() == 2, "in each passage"
     rec.rough[:] = True
     rough = table(tmp_path / "rough.csv", rec)
-    (judged,) = judge(noticed_at_once, lambda: passages(rough))
+    (judged,) = judged_by(noticed_at_once, passages(rough))
     assert judged.courses[0].tally.detected.item() == 1
 
 
@@ -108,7 +116,7 @@ def test_a_firing_before_the_first_rough_ground_is_no_detection_of_its_end():
     """β is 3 s of smooth steps: k would exceed it on the 4 s before the rough ground."""
     rec = crossing()
     given = as_given(height_candidates()[:1], way="flat", alpha=0.0055, beta=300.0)
-    (judged,) = judge(given, lambda: [rec])
+    (judged,) = judged_by(given, [rec])
     tally = judged.courses[0].tally
     assert tally.came.item() == tally.detected.item() == 3
     assert tally.km.item() == pytest.approx(3 * 4.0 / 1000, rel=0.01), "4 m of rough ground each"
@@ -134,7 +142,7 @@ def test_the_numbers_of_a_crossing_are_those_of_the_same_robots_from_the_noise_o
         },
         distance=whole.distance[400:] - whole.distance[400],
     )
-    (first, second) = (tune(only("oracle"), lambda rec=r: [rec], way="flat") for r in (whole, late))
+    (first, second) = (tuned_by(only("oracle"), [r], way="flat") for r in (whole, late))
     assert first[0].choice == second[0].choice
     np.testing.assert_array_equal(first[0].tally.fired, second[0].tally.fired)
     np.testing.assert_allclose(first[0].tally.metres, second[0].tally.metres)
@@ -246,11 +254,11 @@ def mean_area(tuned, recordings, beta):
 
 
 def test_passages_are_scored_at_the_beta_that_tells_them_apart_best():
-    (tuned,) = tune(height_candidates()[:1], uneven, way="rough")
+    (tuned,) = tuned_by(height_candidates()[:1], uneven(), way="rough")
     areas = np.array([mean_area(tuned, uneven(), beta) for beta in BETAS])
     assert areas.max() > areas[np.searchsorted(BETAS, tuned.choice.beta)] + 0.01
     assert tuned.area_beta == BETAS[areas.argmax()]
-    (judged,) = judge([tuned], uneven)
+    (judged,) = judged_by([tuned], uneven())
     told = [area[0] for c in "ab" if (area := judged.area(c)) is not None]
     assert np.mean(told) == pytest.approx(areas.max())
     (row,) = condition_rows([judged])
@@ -263,7 +271,7 @@ def test_passages_are_scored_at_the_beta_that_tells_them_apart_best():
 def test_an_area_is_told_only_where_a_passage_is_long_enough_for_beta(beta, is_told):
     """Six numbers in each of 300 steps make k 1800 at most."""
     given = as_given(height_candidates()[:1], way="rough", alpha=0.01, beta=beta)
-    (judged,) = judge(given, ways)
+    (judged,) = judged_by(given, ways())
     assert (judged.area("into") is not None) == is_told
     (row,), courses = condition_rows([judged]), course_rows([judged])
     assert (row["area"] is None) == (row["area_beta"] is None) == (not is_told)
@@ -309,7 +317,7 @@ def test_chatter_is_more_than_once_there_and_once_back_for_each_rough_stretch():
 def test_the_report_counts_chatter_with_the_shipped_way_back_or_there(way):
     """An oracle on one way, and on the other the shipped condition, live."""
     rec = crossing()
-    (judged,) = judge(as_given(only("oracle"), way=way, alpha=0.5, beta=0.0), lambda: [rec])
+    (judged,) = judged_by(as_given(only("oracle"), way=way, alpha=0.5, beta=0.0), [rec])
     (row,) = course_rows([judged])
     condition = load_condition("touchdown_surprise")
     if way == "rough":
@@ -331,7 +339,7 @@ def test_the_report_counts_chatter_with_the_shipped_way_back_or_there(way):
 def test_a_rule_without_patience_chatters_on_rough_ground():
     """β' is 0 and all heights lie below α': each shift there is followed by one back at once."""
     given = as_given(only("height_difference"), way="flat", alpha=9.0, beta=0.0)
-    (judged,) = judge(given, lambda: [crossing()])
+    (judged,) = judged_by(given, [crossing()])
     (row,) = condition_rows([judged])
     assert row["chattered"] == 3
     assert row["shifts"] > 2 * 3
@@ -369,7 +377,7 @@ def test_columns_that_a_condition_needs_are_named(tmp_path, capsys, log, more):
 def test_only_the_columns_that_are_missing_are_named(tmp_path):
     rec = replace(march("walk", noise=0.04), velocity_b=np.zeros((1200, 3, 3)))
     with pytest.raises(GaitshiftError, match=r"needs angular_velocity_x, [a-z_, ]*_z$"):
-        tune(only("slip"), lambda: [rec], way="rough")
+        tuned_by(only("slip"), [rec], way="rough")
 
 
 def test_a_log_that_chooses_cannot_judge_as_held_out(tmp_path, capsys, log):
@@ -393,15 +401,15 @@ def test_a_condition_named_twice_is_judged_once(tmp_path, capsys, log):
 def test_no_recordings_at_all_are_refused():
     given = as_given(only("paper"), way="rough", alpha=0.1, beta=9.0)
     with pytest.raises(GaitshiftError, match="no recordings to judge by"):
-        judge(given, lambda: [])
+        judged_by(given, [])
 
 
 def test_a_map_tells_beta_in_the_time_of_the_logs(tmp_path):
     """Of logs at 50 Hz, twice the time that the rule takes at 100 Hz; six numbers count a step."""
     slow = [replace(way, time=2 * way.time) for way in ways()]
-    (tuned,) = tune(height_candidates()[:1], lambda: slow, way="rough")
+    (tuned,) = tuned_by(height_candidates()[:1], slow, way="rough")
     tuned = replace(tuned, choice=replace(tuned.choice, beta=37.0, leak=1.2))
-    (judged,) = judge([tuned], lambda: slow)
+    (judged,) = judged_by([tuned], slow)
     figure = condition_map(judged, tmp_path / "map.png")
     expected = 2 * time_to_fire(tuned)
     assert f"β = 37 ({expected:.2g} s at the soonest), leak 1.2" in figure.axes[0].get_title("left")
@@ -409,7 +417,7 @@ def test_a_map_tells_beta_in_the_time_of_the_logs(tmp_path):
 
 def test_every_name_beside_roc_curves_stays_in_the_picture(tmp_path):
     given = as_given(only("touchdown_surprise"), way="rough", alpha=0.01, beta=287.0)
-    judged = judge(given, ways)
+    judged = judged_by(given, ways())
     roc_figure(judged, "into", tmp_path / "roc.png")
     border = imread(tmp_path / "roc.png")[:, -8:]
     assert (border == border[0, 0]).all()

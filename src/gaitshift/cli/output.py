@@ -58,14 +58,19 @@ def progress(label: str) -> Generator[Report]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def check_folder(folder: Path, *, overwrite: bool, ours: tuple[str, ...]) -> None:
+def check_folder(
+    folder: Path, *, overwrite: bool, ours: tuple[str, ...], left: str | None = None
+) -> None:
     """Refuses an output folder that has content, but for `overwrite`; makes nothing.
 
-    Even then nothing is deleted: the files in `ours` will be replaced, others stay.
+    Even then nothing is deleted: the files in `ours` will be replaced, others stay. What a run that
+    was killed has `left` there is no content.
     """
     if folder.exists() and not folder.is_dir():
         raise GaitshiftError(f"{folder} is a file; give a folder with --out")
-    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+    if overwrite or not folder.is_dir():
+        return
+    if any(path.name != left for path in folder.iterdir()):
         raise GaitshiftError(
             f"{folder} exists and is not empty; give another --out, or --overwrite to replace "
             f"{', '.join(ours)} there"

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.identification.recording import Recording
+from gaitshift.identification.recording import Recording, Way
 from gaitshift.identification.table import columns_of
 from gaitshift.switching import (
     AnyStatistic,
@@ -42,6 +42,8 @@ class Candidate:
     """Smallest α that is tried, in `unit`."""
     high: float
     """Largest α that is tried; those between them lie evenly on a logarithmic scale."""
+    low_back: float | None = None
+    """Smallest α that is tried on the way back, where a quiet gait shows less; None: `low`."""
     unit: str = ""
     """Of α."""
     needs: tuple[str, ...] = ()
@@ -53,10 +55,10 @@ class Candidate:
     statistic: AnyStatistic | None = None
     """What says those values step by step; None: they come of whole recordings alone."""
 
-    @property
-    def alphas(self) -> Float[np.ndarray, " A"]:
-        """α that are tried."""
-        return np.geomspace(self.low, self.high, _ALPHAS)
+    def alphas(self, way: Way) -> Float[np.ndarray, " A"]:
+        """α that are tried on this way."""
+        low = self.low if way == "rough" or self.low_back is None else self.low_back
+        return np.geomspace(low, self.high, _ALPHAS)
 
     def missing(self, recording: Recording) -> tuple[str, ...]:
         """Columns of a table that the recording's log lacks, and that it looks at."""
@@ -109,6 +111,7 @@ CANDIDATES = (
         TouchdownSurprise(),
         "touchdown_surprise",
         low=0.005,
+        low_back=0.0005,
         high=0.1,
         note="how new touches change about the plane of the earlier ones",
     ),

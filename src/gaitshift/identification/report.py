@@ -10,7 +10,7 @@ import numpy as np
 from gaitshift.command import CONTROL_PERIOD
 from gaitshift.identification.chatter import SHIPPED, shipped_rule
 from gaitshift.identification.choice import Choice
-from gaitshift.identification.finding import Judged, OnCourse
+from gaitshift.identification.judging import Judged, OnCourse
 from gaitshift.identification.passage import LENGTH
 from gaitshift.identification.statistics import poisson, wilson
 

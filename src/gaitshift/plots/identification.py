@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from gaitshift.identification.finding import Judged
+from gaitshift.identification.judging import Judged
 from gaitshift.plots.palette import GROUND, INK, PALE, PAPER, QUIET
 from gaitshift.plots.style import check_target, house_style, save
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift.identification.finding import Judged
+from gaitshift.identification.judging import Judged
 from gaitshift.identification.report import (
     CONDITIONS_HEAD,
     COURSES_HEAD,
