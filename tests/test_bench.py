@@ -288,6 +288,9 @@ def test_learners_take_turns_and_a_budget_of_nothing_leaves_the_baseline_out(mon
         (0, "trot", "stable-baselines3"),
         (0, "pace", "gaitshift"),
     ]
+    part = TimeToGait(gaits=("bound", "trot"), seeds=2, first_seed=3, baseline_budget=0.0)
+    seeds = [(o.seed, o.gait) for o in time_to_gait(part)]
+    assert seeds == [(3, "bound"), (3, "trot"), (4, "bound"), (4, "trot")]
     alone = TimeToGait(seeds=2, baseline_budget=0.0)
     assert [o.learner for o in time_to_gait(alone)] == ["gaitshift"] * alone.trainings
 
@@ -450,6 +453,9 @@ def test_without_the_baselines_library_one_line_says_so(capsys, monkeypatch):
     ("arguments", "says"),
     [
         (["time-to-gait", "--seeds", "0"], "0 seeds: 1 to 100"),
+        (["time-to-gait", "--first-seed", "-1"], "first seed -1"),
+        (["time-to-gait", "--gaits", "trott"], "trott"),
+        (["time-to-gait", "--gaits"], "no gait"),
         (["time-to-gait", "--baseline-budget", "-1"], "-1.0 s: 0 to 86400"),
         (["time-to-walk"], "time-to-gait"),
         (["--seed", "-1"], "seed -1"),

@@ -33,7 +33,9 @@ class TimeToGait:
     gaits: tuple[str, ...] = ("trot", "pace", "bound")
     """The paper's three."""
     seeds: int = 3
-    """Each gait is trained from the seeds 0, 1, … by each learner."""
+    """Each gait is trained from this many seeds by each learner,"""
+    first_seed: int = 0
+    """of which this is the first."""
     baseline_budget: float = 600.0
     """Training time after which a baseline is given up [s]; 0: no baseline."""
     recipe: Recipe = field(default_factory=_flat_stage)
@@ -49,6 +51,12 @@ class TimeToGait:
     def __post_init__(self) -> None:
         if not 1 <= self.seeds <= 100:
             raise GaitshiftError(f"{self.seeds} seeds: 1 to 100 would be right")
+        if self.first_seed < 0:
+            raise GaitshiftError(f"first seed {self.first_seed}: a seed is 0 or larger")
+        if not self.gaits:
+            raise GaitshiftError("no gait: trot, or another one, would be right")
+        for name in self.gaits:
+            gaits.load(name)
         if not 0 <= self.baseline_budget <= 86_400:
             raise GaitshiftError(
                 f"baseline budget of {self.baseline_budget} s: 0 to 86400 s would be right"
@@ -138,7 +146,7 @@ def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator
     """
     entries = _entries(config)
     known = [outcome for outcome in known if is_of(config, outcome)]
-    for seed in range(config.seeds):
+    for seed in range(config.first_seed, config.first_seed + config.seeds):
         for gait in config.gaits:
             for entry in entries:
                 told = (outcome for outcome in known if entry.knows(outcome, gait, seed))

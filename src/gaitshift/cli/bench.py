@@ -32,8 +32,12 @@ TABLE, PICTURE = "time_to_gait.csv", "time_to_gait.png"
 class TimeToGaitOptions:
     """For `bench time-to-gait`."""
 
+    gaits: tuple[str, ...] | None = None
+    """Which; trot, pace and bound, with --quick trot."""
     seeds: int | None = None
     """Seeds that each gait is trained from; 3, with --quick 1."""
+    first_seed: int | None = None
+    """The first of them; 0."""
     baseline_budget: float | None = None
     """Training time after which a baseline is given up [s]; 600, with --quick 1; 0: no baseline."""
     quick: bool = False
@@ -49,9 +53,12 @@ class TimeToGaitOptions:
         """The measurement asked for."""
         from gaitshift.benchmark.time_to_gait import TimeToGait
 
-        given = {"seeds": self.seeds, "baseline_budget": self.baseline_budget}
-        whole = TimeToGait.quick() if self.quick else TimeToGait()
-        return replace(whole, **{name: x for name, x in given.items() if x is not None})
+        given = {
+            name: getattr(self, name)
+            for name in ("gaits", "seeds", "first_seed", "baseline_budget")
+            if getattr(self, name) is not None
+        }
+        return replace(TimeToGait.quick() if self.quick else TimeToGait(), **given)
 
 
 @dataclass(frozen=True, kw_only=True)
