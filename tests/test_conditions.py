@@ -755,7 +755,7 @@ def test_a_faulty_graph_file_is_named_with_its_place_and_what_would_be_right(
     assert "\n" not in line
 
 
-@pytest.mark.parametrize("name", ["terrain", "speed"])
+@pytest.mark.parametrize("name", ["terrain", "speed", "oscillators"])
 def test_shipped_graphs_load_and_are_drawn_edge_by_edge(name):
     graph = GaitGraph.load(name)
     drawn = graph.mermaid()
@@ -765,7 +765,7 @@ def test_shipped_graphs_load_and_are_drawn_edge_by_edge(name):
 
 
 def test_an_unknown_graph_is_refused_with_those_there_are():
-    with pytest.raises(GaitshiftError, match="graphs are speed, terrain"):
+    with pytest.raises(GaitshiftError, match="graphs are oscillators, speed, terrain"):
         GaitGraph.load("terran")
 
 

@@ -153,6 +153,17 @@ def test_oscillators_shift_by_the_very_condition_of_trained_policies():
     assert (at > 5.0).all(), "and none on flat ground"
 
 
+def test_who_walks_off_the_ground_has_fallen():
+    """One robot stands where there is none, a metre beside the one that has ground below it."""
+    controller = CpgController(["trot"], 2, start="trot")
+    ground = from_spec("perlin:0.03", seed=0, length=4.0, width=4.0)
+    world = World(controller.robot, [ground], 2, gains=controller.gains)
+    start = np.array([[2.0, 0.0], [2.0, 3.0]])
+    run = RolloutConfig(seconds=1.0)
+    log = rollout(world, controller, run, start_xy=start, rng=np.random.default_rng(0))
+    assert log.fallen[-1].tolist() == [False, True]
+
+
 def test_a_gait_without_oscillators_is_refused():
     with pytest.raises(GaitshiftError, match="no oscillators for 'gallop'"):
         CpgController(["gallop"], 1, start="gallop")
@@ -178,11 +189,16 @@ def test_loads_of_standing_legs_are_the_weight():
 
 
 def test_the_demonstration_walks_on_oscillators(tmp_path, capsys):
-    track = ["--track", "flat@3,perlin:0.04@3", "--controller", "cpg", "--no-video", "--json"]
-    main(["demo", *track, "--out", str(tmp_path / "walk")])
+    """There and back by their own graph, each shift behind the border that is its cause."""
+    track = ["--track", "flat@3,perlin:0.05@5,flat@3", "--controller", "cpg"]
+    track += ["--no-video", "--json"]
+    ways = ["--graph", "oscillators"]
+    main(["demo", *track, *ways, "--seed", "1", "--out", str(tmp_path / "walk")])
     summary = json.loads(capsys.readouterr().out)
     assert summary["survived"]
-    assert summary["distance_m"] > 3.0
+    there, back = summary["switches"]
+    assert (there["from"], there["to"], back["to"]) == ("trot", "walk", "trot")
+    assert 3.0 < there["x_m"] < 8.0 < back["x_m"] < 11.0
     with pytest.raises(SystemExit) as end:
         main(["demo", *track, "--rough-gait", "gallop", "--out", str(tmp_path / "none")])
     assert end.value.code == 2

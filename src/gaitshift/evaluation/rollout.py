@@ -39,6 +39,10 @@ class RolloutConfig:
         return max(1, round(self.seconds / CONTROL_PERIOD))
 
 
+OVER_THE_EDGE = 0.5
+"""Robots whose feet are all further below the ground than this have walked off it [m]."""
+
+
 class Walk:
     """N robots on their way along x, a control step at a time."""
 
@@ -93,7 +97,8 @@ class Walk:
         world.push(self._pusher.step() + force_w)
         motion = world.step(target)
         self.steps += 1
-        self.fallen = self.fallen | motion.body_contact
+        is_off = (motion.clearance < -OVER_THE_EDGE).all(axis=1)
+        self.fallen = self.fallen | motion.body_contact | is_off
         driver.see(motion, self._asked)
         if self.switcher is not None:
             self.decision = self.switcher.step(self.time, motion, driver, self.wanted)

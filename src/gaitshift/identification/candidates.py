@@ -26,7 +26,6 @@ from gaitshift.switching import (
 BETAS = np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1.0, 5000.0, 120)))])
 """β that are tried [counts]."""
 
-_ALPHAS = 100
 _LEAKS = (0.0, 0.02, 0.1, 0.3, 0.6)
 
 
@@ -48,6 +47,8 @@ class Candidate:
     """Of α."""
     needs: tuple[str, ...] = ()
     """Optional signals that it looks at."""
+    count: int = 100
+    """How many α are tried."""
     leaks: tuple[float, ...] = _LEAKS
     """Leaks that are tried [counts a step]."""
     note: str = ""
@@ -58,7 +59,7 @@ class Candidate:
     def alphas(self, way: Way) -> Float[np.ndarray, " A"]:
         """α that are tried on this way."""
         low = self.low if way == "rough" or self.low_back is None else self.low_back
-        return np.geomspace(low, self.high, _ALPHAS)
+        return np.geomspace(low, self.high, self.count)
 
     def missing(self, recording: Recording) -> tuple[str, ...]:
         """Columns of a table that the recording's log lacks, and that it looks at."""
@@ -88,6 +89,7 @@ CANDIDATES = (
         HeightDifference(frame="body"),
         "paper",
         low=0.005,
+        low_back=0.001,
         high=0.5,
         leaks=(0.0,),
         note="Algorithm 1 as printed: body frame, no leak",
@@ -96,6 +98,7 @@ CANDIDATES = (
         HeightDifference(),
         "height_difference",
         low=0.005,
+        low_back=0.001,
         high=0.5,
         leaks=_six(_LEAKS),
         note="differences of foot heights along the vertical; a leak may be chosen",
@@ -110,9 +113,9 @@ CANDIDATES = (
     _watching(
         TouchdownSurprise(),
         "touchdown_surprise",
-        low=0.005,
-        low_back=0.0005,
+        low=0.005 / 20 ** (50 / 99),  # 1.1 mm, in the steps of 100 values from 5 mm to 10 cm
         high=0.1,
+        count=150,
         note="how new touches change about the plane of the earlier ones",
     ),
     _watching(
