@@ -9,6 +9,7 @@ from typing import Any, TypeVar, cast
 from joblib import Memory
 
 PACKAGE = Path(__file__).parents[1]
+"""What is kept depends on all code in here."""
 
 Found = TypeVar("Found")
 Stamp = tuple[str, int, int]

@@ -1,7 +1,7 @@
 """Identification from files: conditions tuned on some logs and judged on others."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -44,13 +44,11 @@ class Task:
     """What is to be noticed."""
     numbers: Numbers | None = None
     """None: they are chosen."""
-    _wanted: tuple[Candidate, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.everything and self.numbers is not None:
             raise GaitshiftError("α has another unit in each condition: name those for --alpha")
-        named = candidates([name for name in self.conditions if name not in (NAME, ALL)])
-        object.__setattr__(self, "_wanted", CANDIDATES if self.everything else named)
+        _ = self.wanted  # every name is known
         check_sources((*self.logs, *self.held_out))
         choosing = {path.resolve() for path in self.logs}
         for path in self.held_out:
@@ -64,6 +62,12 @@ class Task:
     def everything(self) -> bool:
         """Whether all conditions are asked for."""
         return ALL in self.conditions
+
+    @property
+    def wanted(self) -> tuple[Candidate, ...]:
+        """All but the classifier, which is fitted first; `GaitshiftError` if one is unknown."""
+        named = candidates([name for name in self.conditions if name not in (NAME, ALL)])
+        return CANDIDATES if self.everything else named
 
     @property
     def judges(self) -> tuple[Path, ...]:
@@ -112,7 +116,7 @@ class Task:
     def _tuned(
         self, kept: Kept, classifier: RoughnessClassifier | None, learned: tuple[Stamp, ...]
     ) -> list[Tuned]:
-        wanted = list(self._wanted)
+        wanted = list(self.wanted)
         if classifier is not None:
             wanted.append(classifier.candidate(crosswise=True))
         if self.numbers is not None:
