@@ -18,6 +18,7 @@ from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.gait_analysis import measure, robot_mass
 from gaitshift.gaits import load
 from gaitshift.legs import LEGS
+from gaitshift.log import Log
 from gaitshift.robot import ANYMAL_B
 from gaitshift.switching import Autonomous, Condition, GaitGraph, TouchdownSurprise
 from gaitshift.terrain import from_spec
@@ -113,6 +114,7 @@ def test_each_gait_walks_at_its_speed_and_is_named_by_its_contacts(name):
     assert figures["survival"] == 1.0
     assert figures["verdict"]["gait"] == name
     assert figures["speed_mean"] == pytest.approx(GAITS[name].speed, abs=0.08)
+    assert figures["cycles_per_s"] == pytest.approx(GAITS[name].frequency, rel=0.05)
 
 
 @pytest.mark.parametrize(
@@ -162,6 +164,22 @@ def test_who_walks_off_the_ground_has_fallen():
     run = RolloutConfig(seconds=1.0)
     log = rollout(world, controller, run, start_xy=start, rng=np.random.default_rng(0))
     assert log.fallen[-1].tolist() == [False, True]
+
+
+def test_oscillators_are_judged_as_policies_are(capsys, tmp_path):
+    log = tmp_path / "log.npz"
+    main(["evaluate", "trot", "--controller", "cpg", "--episodes", "8", "--seconds", "5",
+          "--json", "--log", str(log)])  # fmt: skip
+    figures = json.loads(capsys.readouterr().out)
+    assert (figures["controller"], figures["gait"]) == ("cpg", "trot")
+    assert figures["survival"] == 1.0
+    assert figures["verdict"]["gait"] == "trot"
+    assert Log.load(log).fallen.shape[1] == 8
+    for more in (["--trials", "quick"], ["--commands"]):
+        with pytest.raises(SystemExit) as end:
+            main(["evaluate", "trot", "--controller", "cpg", *more])
+        assert end.value.code == 2
+        assert "is for policies" in capsys.readouterr().err
 
 
 def test_a_gait_without_oscillators_is_refused():

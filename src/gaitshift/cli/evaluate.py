@@ -1,25 +1,34 @@
 """`gaitshift evaluate`: judges a policy on many robots at once."""
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
+from gaitshift import gaits
 from gaitshift import policy as policies
-from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
+from gaitshift.cpg import CpgController
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation import (
     SIZES,
     EvaluationConfig,
     Followed,
     evaluate,
+    evaluate_controller,
     follow_commands,
     run_trials,
 )
 from gaitshift.evaluation.trials import Row
 from gaitshift.log import Log
+from gaitshift.reward_machine import RewardMachine
 from gaitshift.robot_file import use_robot_file
+
+Judged = tuple[dict[str, Any], Log]
+"""Figures, and the log that they are of."""
 
 UNITS = {
     "speed_mean": "m/s",
@@ -46,6 +55,9 @@ class Evaluate(EvaluationConfig):
 
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
+    controller: Literal["policy", "cpg"] = "policy"
+    """What walks: the policy, or, in the gait of this name, coupled oscillators that learned
+    nothing: a baseline (trot, pace, bound, walk)."""
     robot_file: Path | None = None
     """The robot of the policy, if it is not ANYmal B, as it was given to `train`."""
     trials: Literal["all", "short", "quick"] | None = None
@@ -67,41 +79,50 @@ class Evaluate(EvaluationConfig):
         """Evaluates, prints and draws."""
         self._check_files()
         use_robot_file(self.robot_file)
-        loaded = policies.load(self.policy)
         if self.log is not None:
             self.log.parent.mkdir(parents=True, exist_ok=True)
+        if self.controller == "cpg":
+            walker = CpgController([self.policy], self.episodes, start=self.policy)
+            told = {"controller": "cpg", "gait": self.policy}
+            figures, log = self._evaluate(partial(evaluate_controller, walker), told)
+            self._write(figures, log, gaits.load(self.policy))
+            return
+        loaded = policies.load(self.policy)
         if self.commands:
             self._command(loaded)
             return
         if self.trials is None:
-            figures, log = self._evaluate(loaded)
+            told = {"policy": str(loaded.path), "gait": loaded.gait}
+            figures, log = self._evaluate(partial(evaluate, loaded), told)
         else:
             figures, log = self._try(loaded, self.trials)
+        self._write(figures, log, loaded.machine)
+
+    def _write(self, figures: dict[str, Any], log: Log, machine: RewardMachine) -> None:
+        """The files that are asked for."""
         if self.log is not None:
             log.save(self.log)
             say(f"log written to {self.log}")
         if self.plot is not None:
             from gaitshift.plots import hildebrand_diagram  # matplotlib is slow to import
 
-            hildebrand_diagram(log, figures, loaded.machine, self.plot)
+            hildebrand_diagram(log, figures, machine, self.plot)
             say(f"diagram written to {self.plot}")
 
-    def _evaluate(self, loaded: policies.Policy) -> tuple[dict[str, Any], Log]:
-        config = self._config()
-        with progress(f"{loaded.gait} on {self.terrain}") as report:
-            figures, log = evaluate(loaded, config, report)
+    def _evaluate(
+        self, walk: Callable[[EvaluationConfig, Report], Judged], told: dict[str, str]
+    ) -> Judged:
+        config, gait = self._config(), told["gait"]
+        with progress(f"{gait} on {self.terrain}") as report:
+            figures, log = walk(config, report)
         if self.json:
-            emit_json(
-                {"policy": str(loaded.path), "gait": loaded.gait, **asdict(config), **figures}
-            )
+            emit_json({**told, **asdict(config), **figures})
         else:
-            title = f"{loaded.gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"
+            title = f"{gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"
             emit_table(title, _figure_rows(figures))
         return figures, log
 
-    def _try(
-        self, loaded: policies.Policy, size: Literal["all", "short", "quick"]
-    ) -> tuple[dict[str, Any], Log]:
+    def _try(self, loaded: policies.Policy, size: Literal["all", "short", "quick"]) -> Judged:
         with progress(f"trials of {loaded.gait}") as report:
             rows, figures, log = run_trials(loaded, SIZES[size], self.seed, report)
         if self.json:
@@ -149,6 +170,8 @@ class Evaluate(EvaluationConfig):
         if self.trials is None and not self.commands:
             return
         mode = "--commands" if self.commands else "--trials"
+        if self.controller != "policy":
+            raise GaitshiftError(f"{mode} is for policies: no --controller {self.controller}")
         if self.commands and (self.trials or self.log or self.plot):
             raise GaitshiftError("--commands stands alone: no --trials, --log or --plot")
         for field in fields(EvaluationConfig):

@@ -60,10 +60,12 @@ class CpgController:
         self.gaits = tuple(gaits)
         self.n = n
         self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        """For logs; oscillators have no machine."""
+        """For logs: oscillators have no machine, and go through its states at an even pace, from
+        one touchdown of the first leg that is asked of them to the next."""
         self._of = [GAITS[name] for name in self.gaits]
         self._machines = [load(name) for name in self.gaits]
         self._offset = -np.array([machine.ideal_phase for machine in self._machines])
+        self._parts = np.array([len(machine.states) for machine in self._machines])
         self._duty = np.array([gait.duty for gait in self._of])
         self._sweep = np.array([gait.sweep for gait in self._of])
         self._home = np.stack(
@@ -101,6 +103,7 @@ class CpgController:
         offset, frequency = self._offset[self.gait], command.stride_frequency
         self._state = self.network.step(self._state, offset, frequency, CONTROL_PERIOD)
         phase = phase_of(self._state)
+        self.machine_state = np.floor(phase[:, 0] * self._parts[self.gait]).astype(np.int64)
         angles = joint_angles(self._feet(phase, motion, command))
         rate = np.zeros_like(angles) if self._angles is None else angles - self._angles
         self._angles = angles

@@ -7,6 +7,7 @@ from gaitshift.evaluation.demo import run_demo as run_demo
 from gaitshift.evaluation.demo import summarise as summarise
 from gaitshift.evaluation.evaluate import EvaluationConfig as EvaluationConfig
 from gaitshift.evaluation.evaluate import evaluate as evaluate
+from gaitshift.evaluation.evaluate import evaluate_controller as evaluate_controller
 from gaitshift.evaluation.glance import glance as glance
 from gaitshift.evaluation.rollout import RolloutConfig as RolloutConfig
 from gaitshift.evaluation.rollout import rollout as rollout

@@ -1,4 +1,4 @@
-"""Judges one policy: many robots at once on a ground given by its spec."""
+"""Judges one policy, or another controller: many robots at once on a ground given by its spec."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift import gaits
 from gaitshift.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.errors import GaitshiftError
 from gaitshift.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.gait_analysis import measure, robot_mass
 from gaitshift.log import Log
 from gaitshift.policy import Policy
-from gaitshift.switching import Driver
+from gaitshift.switching import Controller, Driver
 from gaitshift.terrain import Terrain, from_spec
 from gaitshift.world import PushConfig, World
 
@@ -76,8 +77,22 @@ def evaluate(
 ) -> tuple[dict[str, Any], Log]:
     """Runs the deterministic policy and measures it (`gait_analysis.measure`)."""
     log = run_policy(policy, config, report=report)
-    machines = {policy.gait: policy.machine}
-    return measure(log, machines, mass=robot_mass(policy.robot.name)), log
+    return measure(log, {policy.gait: policy.machine}, mass=robot_mass(policy.robot.name)), log
+
+
+def evaluate_controller(
+    controller: Controller,
+    config: EvaluationConfig,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[dict[str, Any], Log]:
+    """Runs robots that are all in one gait, and measures them by that gait's own machine.
+
+    Raises:
+        GaitshiftError: a gait of the controller has no machine of its name.
+    """
+    log = run_controller(controller, config, report=report)
+    machines = {name: gaits.load(name) for name in controller.gaits}
+    return measure(log, machines, mass=robot_mass(controller.robot.name)), log
 
 
 def run_policy(
@@ -92,6 +107,19 @@ def run_policy(
 
     With `values` the log keeps what the policy's critic expects.
     """
+    driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
+    return run_controller(driver, config, finish_x=finish_x, values=values, report=report)
+
+
+def run_controller(
+    controller: Controller,
+    config: EvaluationConfig,
+    *,
+    finish_x: float = np.inf,
+    values: bool = False,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> Log:
+    """Runs the controller's robots, as many as `config.episodes`, like `run_policy`."""
     rng = np.random.default_rng(config.seed)
     run = RolloutConfig(
         seconds=config.seconds,
@@ -101,12 +129,14 @@ def run_policy(
         speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
         values=values,
     )
-    driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
-    speed = policy.info.forward_speed if config.speed is None else config.speed
+    own = float(controller.own_command().forward_speed.max())
+    speed = own if config.speed is None else config.speed
     grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
-    world = World(policy.robot, grounds, config.episodes, gains=policy.info.gains)
-    start = starts(config.episodes, policy, rng)
-    return rollout(world, driver, run, start_xy=start, rng=rng, finish_x=finish_x, report=report)
+    world = World(controller.robot, grounds, controller.n, gains=controller.gains)
+    start = starts(controller, rng)
+    return rollout(
+        world, controller, run, start_xy=start, rng=rng, finish_x=finish_x, report=report
+    )
 
 
 def field_length(speed: float, seconds: float) -> float:
@@ -114,15 +144,16 @@ def field_length(speed: float, seconds: float) -> float:
     return 2 * RUN_UP + (1 + MARGIN) * speed * seconds
 
 
-def starts(n: int, policy: Policy, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-    """Where n robots begin [m].
+def starts(controller: Controller, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
+    """Where its robots begin [m].
 
     Spread over the width, so that robots on one field do not walk over the same ground, and over a
     stride, so that they meet an edge at all instants of it.
     """
+    n, command = controller.n, controller.own_command()
+    stride = command.forward_speed / command.stride_frequency
     start = np.zeros((n, 2))
     start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, n)
-    stride = policy.info.forward_speed / policy.info.stride_frequency
     start[:, 0] = rng.uniform(-stride / 2, stride / 2, n)
     return start
 

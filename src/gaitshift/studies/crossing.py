@@ -113,7 +113,7 @@ def _batch(
     def sees(motion: Motion) -> Bool[np.ndarray, " N"]:
         return is_rough(motion.base_position_w[:, 0], name, x0, length)
 
-    start = starts(n, policies[way.start], rng)
+    start = starts(driver, rng)
     log = rollout(
         world,
         driver,

@@ -114,7 +114,7 @@ def _run_batch(
         world,
         driver,
         RolloutConfig(seconds=seconds),
-        start_xy=starts(n, old, rng),
+        start_xy=starts(driver, rng),
         rng=rng,
         switcher=_AtSteps(at, pair.new),
     )
