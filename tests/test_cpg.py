@@ -175,11 +175,24 @@ def test_oscillators_are_judged_as_policies_are(capsys, tmp_path):
     assert figures["survival"] == 1.0
     assert figures["verdict"]["gait"] == "trot"
     assert Log.load(log).fallen.shape[1] == 8
-    for more in (["--trials", "quick"], ["--commands"]):
-        with pytest.raises(SystemExit) as end:
-            main(["evaluate", "trot", "--controller", "cpg", *more])
-        assert end.value.code == 2
-        assert "is for policies" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["trot", "--trials", "quick"], "--trials is for policies"),
+        (["trot", "--commands"], "--commands is for policies"),
+        (["trot", "--robot-file", "pony.toml"], "no --robot-file"),
+        (["gallop", "--log", "{folder}/new/log.npz"], "no oscillators for 'gallop'"),
+    ],
+)
+def test_what_oscillators_cannot_be_judged_by_is_refused(tmp_path, capsys, arguments, says):
+    given = [argument.format(folder=tmp_path) for argument in arguments]
+    with pytest.raises(SystemExit) as end:
+        main(["evaluate", *given, "--controller", "cpg"])
+    assert end.value.code == 2
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_gait_without_oscillators_is_refused():

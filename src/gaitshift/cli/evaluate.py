@@ -78,16 +78,16 @@ class Evaluate(EvaluationConfig):
     def run(self) -> None:
         """Evaluates, prints and draws."""
         self._check_files()
-        use_robot_file(self.robot_file)
-        if self.log is not None:
-            self.log.parent.mkdir(parents=True, exist_ok=True)
         if self.controller == "cpg":
             walker = CpgController([self.policy], self.episodes, start=self.policy)
+            self._make_folder()
             told = {"controller": "cpg", "gait": self.policy}
             figures, log = self._evaluate(partial(evaluate_controller, walker), told)
             self._write(figures, log, gaits.load(self.policy))
             return
+        use_robot_file(self.robot_file)
         loaded = policies.load(self.policy)
+        self._make_folder()
         if self.commands:
             self._command(loaded)
             return
@@ -97,6 +97,11 @@ class Evaluate(EvaluationConfig):
         else:
             figures, log = self._try(loaded, self.trials)
         self._write(figures, log, loaded.machine)
+
+    def _make_folder(self) -> None:
+        """Of the log: where it cannot be made, nothing is walked for it."""
+        if self.log is not None:
+            self.log.parent.mkdir(parents=True, exist_ok=True)
 
     def _write(self, figures: dict[str, Any], log: Log, machine: RewardMachine) -> None:
         """The files that are asked for."""
@@ -167,6 +172,8 @@ class Evaluate(EvaluationConfig):
             from gaitshift.plots.style import check_target
 
             check_target(self.plot)
+        if self.controller == "cpg" and self.robot_file is not None:
+            raise GaitshiftError("the oscillators know ANYmal B alone: no --robot-file")
         if self.trials is None and not self.commands:
             return
         mode = "--commands" if self.commands else "--trials"
