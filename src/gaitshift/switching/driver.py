@@ -146,6 +146,9 @@ class Driver:
 
     def _groups(self) -> list[tuple[int, Int[np.ndarray, " K"]]]:
         """Which robots use which gait, for the gaits in use."""
+        first = int(self.gait[0])
+        if (self.gait == first).all():
+            return [(first, np.arange(self.n))]
         return [(int(index), np.flatnonzero(self.gait == index)) for index in np.unique(self.gait)]
 
     def _check_known(self, gait: str) -> None:

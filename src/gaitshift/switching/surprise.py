@@ -41,6 +41,7 @@ ASIDE_WINDOW = 1.0
 """How far it is off is a root mean square that forgets by e in this time [s]."""
 
 _HEADING = HeadingWatch()
+_SHARES = np.array(SHARES)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -137,7 +138,8 @@ class TouchdownSurprise:
             error = np.where(thrown[:, None], np.nan, error)
             square = np.where(thrown[:, None], 0.0, square)
             steep = np.where(thrown, 0.0, steep)
-        deviation = np.prod(np.sqrt(square) ** np.array(SHARES), axis=1)
+        powers = np.sqrt(square) ** _SHARES
+        deviation = powers[:, 0] * powers[:, 1]
         aside_by = np.maximum(np.sqrt(aside) / STEADY, 1.0)
         value = deviation / aside_by / np.maximum(steep / STEEP, 1.0)
         known = ~np.isnan(error[:, -1])

@@ -105,6 +105,8 @@ class Autonomous:
         fire = np.zeros(self._k.shape, dtype=bool)
         for index, edge in enumerate(self.graph.edges):
             here = driver.gait == driver.gaits.index(edge.source)
+            if not here.any():
+                continue
             factor = 1.0 if edge.modulation is None else edge.modulation.factor(signals)
             counted = edge.rule.step(self._k[:, index], values[edge.statistic], factor)
             self._k[here, index] = counted[here]
@@ -113,7 +115,7 @@ class Autonomous:
             closer = here & (near > nearest)
             nearest[closer] = near[closer]
             k[closer], threshold[closer] = counted[closer], edge.rule.beta
-        height = np.nan_to_num(self._height)  # of feet that never touched: 0
+        height = np.where(np.isnan(self._height), 0.0, self._height)  # 0: it never touched
         return Decision(k=k, threshold=threshold, foot_height=height), fire
 
     def _shift(self, fire: Bool[np.ndarray, "N E"], motion: Motion, driver: Controller) -> None:

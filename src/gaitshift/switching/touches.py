@@ -61,7 +61,9 @@ class Touches:
         odometry, foot = LegOdometry().step(state.odometry, signals)
         contact = signals.contact
         new = contact & (state.time_up >= self.least_swing)
-        touch = np.where(new[..., None, None], np.roll(state.touch, 1, axis=2), state.touch)
+        touch = state.touch.copy()
+        if new.any():
+            touch[:, :, 1:] = np.where(new[..., None, None], touch[:, :, :-1], touch[:, :, 1:])
         touch[:, :, 0] = np.where(contact[..., None], foot, touch[:, :, 0])
         time_up = np.where(contact, 0.0, state.time_up + signals.period)
         return TouchState(odometry=odometry, touch=touch, time_up=time_up), new, foot
