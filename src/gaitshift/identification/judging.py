@@ -20,7 +20,7 @@ from gaitshift.identification.passage import longest_passage, passage_scores
 from gaitshift.identification.recording import Recording
 from gaitshift.identification.scores import detections
 from gaitshift.identification.statistics import auc, auc_interval
-from gaitshift.identification.tally import Tally
+from gaitshift.identification.tally import Tally, join_by_name
 from gaitshift.identification.tuning import Tuned
 
 
@@ -69,12 +69,7 @@ class Replayed:
     def join(self, other: "Replayed") -> None:
         """Takes in all that another one has."""
         for name, by_course in other.courses.items():
-            mine = self.courses.setdefault(name, {})
-            for course, one in by_course.items():
-                if course in mine:
-                    mine[course].join(one)
-                else:
-                    mine[course] = one
+            join_by_name(self.courses.setdefault(name, {}), by_course)
         self.soonest |= other.soonest
         for name, scored in other.scored.items():
             self.scored[name] = self.scored.get(name, False) or scored

@@ -1,7 +1,8 @@
 """All recordings of a kind of ground together, at each α and β of a grid."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -87,6 +88,26 @@ class Tally:
     def false_per_km(self) -> Float[np.ndarray, "A B"]:
         """Shifts on smooth ground a kilometre; NaN where none was walked."""
         return _share(self.fired, self.km)
+
+
+class Joining(Protocol):
+    """What came of some recordings, and takes in what came of others."""
+
+    def join(self, other: Self, /) -> None:
+        """Takes in all that another one has."""
+        ...
+
+
+Part = TypeVar("Part", bound=Joining)
+
+
+def join_by_name(mine: dict[str, Part], others: Mapping[str, Part]) -> None:
+    """Takes in, for each name, all that the others have of it."""
+    for name, other in others.items():
+        if name in mine:
+            mine[name].join(other)
+        else:
+            mine[name] = other
 
 
 def replay(

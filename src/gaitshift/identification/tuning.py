@@ -10,7 +10,7 @@ from gaitshift.identification.facing import facing
 from gaitshift.identification.grid import first_firings
 from gaitshift.identification.passage import GridScores, best_beta, passage_grid
 from gaitshift.identification.recording import Recording, Way
-from gaitshift.identification.tally import Grid, Tally
+from gaitshift.identification.tally import Grid, Tally, join_by_name
 from gaitshift.switching import Rule
 
 
@@ -82,12 +82,7 @@ class Tried:
         self.lacking |= other.lacking
         for name, by_leak in other.found.items():
             for leak, by_course in by_leak.items():
-                mine = self.found.setdefault(name, {}).setdefault(leak, {})
-                for course, one in by_course.items():
-                    if course in mine:
-                        mine[course].join(one)
-                    else:
-                        mine[course] = one
+                join_by_name(self.found.setdefault(name, {}).setdefault(leak, {}), by_course)
 
 
 def try_grids(candidates: Sequence[Candidate], recordings: Iterable[Recording], way: Way) -> Tried:
