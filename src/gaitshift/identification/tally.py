@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, Self, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -90,10 +90,11 @@ class Tally:
         return _share(self.fired, self.km)
 
 
+@runtime_checkable
 class Joining(Protocol):
     """What came of some recordings, and takes in what came of others."""
 
-    def join(self, other: Self, /) -> None:
+    def join(self, other: Any, /) -> None:
         """Takes in all that another one has."""
         ...
 
