@@ -1,6 +1,7 @@
 """The documentation: every block of code and every command in it is run, and the site is built."""
 
 import re
+import runpy
 import shlex
 import shutil
 import subprocess
@@ -61,3 +62,12 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     reference = (tmp_path / "reference.html").read_text(encoding="utf-8")
     for name in ("Condition", "TouchdownSurprise", "RewardMachine", "Recording", "GaitEnv"):
         assert f">{name}<" in reference or f'{name}"' in reference, name
+
+
+def test_pages_on_shifting_are_made_by_the_commands_that_stand_on_them():
+    path = ROOT / "tools" / "shifting_evidence.py"
+    names = runpy.run_path(str(path))
+    made = {page: ["identify", *arguments] for page, arguments in names["IDENTIFIED"].items()}
+    for page, command in (made | names["STUDIED"]).items():
+        text = (ROOT / "docs" / "results" / "shifting" / page / "README.md").read_text("utf-8")
+        assert f"Made by `gaitshift {' '.join(command)} --out " in text, page
