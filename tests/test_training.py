@@ -46,7 +46,10 @@ TINY = Recipe(
             swing_factor=1.5,
             kl_factor=3.0,
             horizon_factor=2.0,
+            trace_factor=2.5,
             mixed_starts=0.5,
+            settle=1.0,
+            averaged=0.8,  # iterations 3.6 to 6: two checkpoints
         ),
     ),
     robots=4,
@@ -54,8 +57,6 @@ TINY = Recipe(
     strict_from=1,
     strict_until=4,
     command_from=0,
-    settle=0.5,
-    averaged=0.4,  # iterations 3.6 to 6: two checkpoints
     command_until=5,
     checkpoint_every=2,
     threads=1,
@@ -183,8 +184,6 @@ def test_the_paper_preset_has_the_defaults_of_stable_baselines3_but_for_those_to
         {"strict_from": -1},
         {"command_from": 5, "command_until": 5},
         {"command_from": -1},
-        {"settle": 1.5},
-        {"averaged": -0.1},
         {"stages": ()},
         {"stages": (Stage(name="flat", iterations=0),)},
         {"stages": (Stage(name="flat", iterations=5), Stage(name="rough", iterations=-1))},
@@ -194,6 +193,22 @@ def test_recipes_that_cannot_be_run_are_refused(faulty):
     name = "iterations" if "stages" in faulty else next(iter(faulty))
     with pytest.raises(GaitshiftError, match=name):
         replace(TINY, **faulty)
+
+
+@pytest.mark.parametrize(
+    ("faulty", "right"),
+    [
+        ({"settle": 1.5}, "0 to 1"),
+        ({"averaged": -0.1}, "0 to 1"),
+        ({"trace_factor": 0.0}, "more than 0"),
+        ({"horizon_factor": -1.0}, "more than 0"),
+        ({"fields": ("flat", "moon")}, "flat, perlin, slope, stair, step"),
+        ({"fields": ()}, "flat, perlin, slope, stair, step"),
+    ],
+)
+def test_stages_that_cannot_be_run_are_refused(faulty, right):
+    with pytest.raises(GaitshiftError, match=f"{next(iter(faulty))}.*{right}"):
+        Stage(name="rough", iterations=5, **faulty)
 
 
 @pytest.mark.parametrize(
@@ -237,11 +252,13 @@ def test_commands_spread_in_a_straight_line_and_go_by_no_other_schedule():
     assert {i: recipe.command_scale(i) for i in table} == table
 
 
-def test_a_policy_settles_in_the_last_part_of_its_iterations():
-    recipe = replace(ABC.with_iterations(100), settle=0.4)
+def test_a_policy_settles_in_the_last_part_of_the_stage_it_ends_with():
+    first, last = Stage(name="a", iterations=50, settle=1.0), Stage(name="b", iterations=50)
+    recipe = replace(TINY, stages=(first, replace(last, settle=0.8)))
     table = {0: 1.0, 60: 1.0, 70: 0.775, 80: 0.55, 100: 0.1}
     assert {i: pytest.approx(recipe.settling(i)) for i in table} == table
-    assert replace(recipe, settle=0.0).settling(100) == 1.0
+    assert recipe.with_iterations(50).settling(25) == pytest.approx(0.55), "it ends with the first"
+    assert replace(recipe, stages=(first, replace(last, settle=0.0))).settling(100) == 1.0
 
 
 # Grounds ----------------------------------------------------------------------------------------
@@ -387,6 +404,7 @@ def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
     factor = settled * run.recipe.stages[-1].kl_factor
     assert run.learner.ppo.desired_kl == factor * run.recipe.ppo.desired_kl != 0.0
     assert run.learner.ppo.gamma == pytest.approx(0.995), "1 / (1 - 0.99) steps, twice"
+    assert run.learner.ppo.lam == pytest.approx(0.98), "1 / (1 - 0.95) steps, two and a half times"
 
 
 def test_the_policy_left_behind_is_the_trained_actor_and_says_how_it_was_made(whole):
@@ -430,10 +448,12 @@ def test_the_policy_left_behind_is_the_mean_of_the_last_actors(whole):
     assert not torch.equal(earlier["mlp.0.weight"], last["mlp.0.weight"])
 
 
-def test_only_the_last_share_of_a_run_is_averaged():
-    recipe = replace(ABC.with_iterations(100), averaged=0.2)
+def test_only_the_last_share_of_the_last_stage_is_averaged():
+    first, last = Stage(name="a", iterations=60), Stage(name="b", iterations=40, averaged=0.5)
+    recipe = replace(TINY, stages=(first, last))
     assert [recipe.is_averaged(n) for n in (0, 79, 80, 100)] == [False, False, True, True]
-    assert not replace(recipe, averaged=0.0).is_averaged(99)
+    alone = replace(recipe, stages=(first, replace(last, averaged=0.0)))
+    assert not any(alone.is_averaged(n) for n in (0, 99, 100))
 
 
 def test_the_config_is_read_back_into_the_same_run(whole):

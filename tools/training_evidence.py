@@ -188,8 +188,9 @@ def write_additions(processes: int, seeds: int) -> Path:
 def write_shifts(processes: int, seeds: int) -> Path:
     """The table of shifts into policies that were trained for them, and into others."""
     plain = Recipe(threads=1, physics_threads=1)
-    flat, rough = plain.stages
-    mixed = replace(plain, stages=(flat, replace(rough, mixed_starts=MIXED_STARTS)))
+    flat, *rough = plain.stages
+    starts = (replace(stage, mixed_starts=MIXED_STARTS) for stage in rough)
+    mixed = replace(plain, stages=(flat, *starts))
     settings = (
         Default(name="plain", group="shifts", label="as it is", recipe=plain),
         Default(name="mixed", group="shifts", label="mixed starts", recipe=mixed),

@@ -13,11 +13,6 @@ FIELD = 20.0
 FIRST_SHARE = 0.3
 """Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
 
-KINDS = ("flat",) * 3 + ("perlin",) * 2 + ("slope",) + ("stair",) * 3 + ("step",) * 3
-"""The fields that robots share out at a time; ours: level ground stays among them, or speeds and
-touchdowns that were learned on it get lost. With one field of stairs and one of steps in nine, 8 of
-64 bounding robots stayed up over steps of 10 cm; with these, 64."""
-
 RUNS = {"stair": (0.30, 0.50), "step": (1.0, 2.5)}
 """Shortest and longest tread [m]; ours: those of staircases, and room for strides in between."""
 
@@ -41,7 +36,7 @@ def draw_grounds(stage: Stage, within: int, seed: int) -> tuple[Terrain, ...]:
         return (flat(FIELD, FIELD),)
     rng = np.random.default_rng((seed, within))
     grown = min(1.0, FIRST_SHARE + (1 - FIRST_SHARE) * within / max(1, stage.iterations / 2))
-    return tuple(_draw(kind, stage, grown, rng) for kind in KINDS)
+    return tuple(_draw(kind, stage, grown, rng) for kind in stage.fields)
 
 
 def _draw(kind: str, stage: Stage, grown: float, rng: np.random.Generator) -> Terrain:

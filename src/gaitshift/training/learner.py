@@ -78,12 +78,15 @@ class Learner:
             "learning_rate": self.ppo.learning_rate,
         }
 
-    def aim(self, *, desired_kl: float, entropy: float, horizon: float = 1.0) -> None:
-        """Sets factors on the divergence that updates aim at, the entropy bonus and the horizon."""
+    def aim(
+        self, *, desired_kl: float, entropy: float, horizon: float = 1.0, trace: float = 1.0
+    ) -> None:
+        """Sets factors on what updates aim at, the entropy bonus, 1 / (1 - γ) and 1 / (1 - λ)."""
         config = self.recipe.ppo
         self.ppo.desired_kl = desired_kl * config.desired_kl
         self.ppo.entropy_coef = entropy * config.entropy
         self.ppo.gamma = 1.0 - (1.0 - config.discount) / horizon
+        self.ppo.lam = 1.0 - (1.0 - config.gae_lambda) / trace
 
     def _check_weights(self) -> None:
         for network, model in (("actor", self.ppo.actor), ("critic", self.ppo.critic)):

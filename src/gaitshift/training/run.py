@@ -214,7 +214,10 @@ class Run:
         env.penalty_scale = self.recipe.penalty_scale(self.iteration)
         settling = self.recipe.settling(self.iteration)
         self.learner.aim(
-            desired_kl=stage.kl_factor * settling, entropy=settling, horizon=stage.horizon_factor
+            desired_kl=stage.kl_factor * settling,
+            entropy=settling,
+            horizon=stage.horizon_factor,
+            trace=stage.trace_factor,
         )
         if self._is_checkpoint():
             self.learner.start_episodes(_seed_at(self.seed, self.iteration))
