@@ -315,6 +315,11 @@ def test_three_fields_stay_level_two_are_noise_and_the_others_a_slope_and_stairs
         assert len({ground.extent for ground in grounds}) == 1, "robots share one rectangle"
 
 
+def test_the_last_stage_has_more_level_fields_and_fewer_edges():
+    grounds = draw_grounds(Recipe().stages[-1], 20, 3)
+    assert sorts(grounds) == ["level"] * 5 + ["noise"] * 2 + ["plane"] + ["stairs"] * 4
+
+
 def test_slopes_rise_in_any_direction():
     angles = []
     for within in range(0, 50):
