@@ -351,17 +351,30 @@ def test_a_step_surprises_the_feet_that_lead_by_its_height_and_then_no_more(spee
             **walk,
         )
         first = np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]
-        expected = abs(rise) / math.sqrt(2.0)
+        expected = abs(rise) * math.sqrt(math.pi) / 2.0
         assert seen[first] == pytest.approx(expected, abs=0.002), "the first foot on it"
         assert np.isfinite(seen[first - 1]), "level ground before, and it was seen"
         assert seen[-1] < 0.002, "level ground behind"
 
 
-def test_changes_of_surprise_are_averaged_by_their_squares():
-    """Of three changes one is of 6 cm: √(0.06² / 3 / 2) = 2.45 cm, just then."""
+def test_changes_of_surprise_are_averaged_by_their_sizes():
+    """Of three changes one is of 6 cm: 2 cm in the mean, of which √π/2 are 1.77 cm, just then."""
     walk = {"turn": 0.0, "wobble": 0.0}
     seen = course(TouchdownSurprise(memory=3), lambda x, y: 0.06 * (x > 2.0), **walk)
-    assert seen[np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]] == pytest.approx(0.0245, abs=0.001)
+    assert seen[np.flatnonzero(np.nan_to_num(seen) > 0.002)[0]] == pytest.approx(0.0177, abs=0.001)
+
+
+def test_a_drift_of_errors_is_no_surprise():
+    """A cubic leaves its plane by ever more, and by as much more at each touchdown."""
+    walk = {"turn": 0.0, "wobble": 0.0, "seconds": 8.0}
+    statistic, state, seen = TouchdownSurprise(), None, []
+    for _, signals in strolling(lambda x, y: 0.004 * x**3, **walk):
+        state = state or statistic.start(1)
+        state, value = statistic.step(state, signals)
+        seen.append((value[0, 0], *state.change[0]))
+    told, change, over_three = np.array(seen)[-1]
+    assert over_three == pytest.approx(3.0 * change, rel=0.05)
+    assert told < 0.2 * change
 
 
 def test_where_a_slope_begins_touches_surprise_less_than_a_step_of_its_rise_in_a_stride():

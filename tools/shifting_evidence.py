@@ -42,9 +42,9 @@ def logs(gait: str, courses: tuple[str, ...], *seeds: int) -> list[str]:
     return [f"logs/{gait}-{course}-{seed}.npz" for seed in seeds for course in sorted(courses)]
 
 
-CHOOSING = logs("trot", (*SMOOTH, "into-0.10", "into-0.15", "into-0.20"), 0)
-FOREIGN = logs("trot", (*SMOOTH, "into-0.10"), 1, 2, 3)
-SECOND = logs("trot", (*SMOOTH, "stairs-5cm", *NOISE), 1)
+CHOOSING = logs("trot", (*SMOOTH, "into-0.10", "into-0.15", "into-0.20"), 0, 1)
+FOREIGN = logs("trot", (*SMOOTH, "into-0.10"), 2, 3, 4)
+SECOND = logs("trot", (*SMOOTH, "stairs-5cm", *NOISE), 2)
 AUDITED = [
     *sorted(logs("trot", NOISE, 0, 1)),
     *logs("trot", tuple(f"into-{a}" for a in ROUGHER), 0),
@@ -57,14 +57,19 @@ IDENTIFIED = {
         *("--held-out", *logs("bound", WAY_BACK, 1)),
         *("--way", "flat", "--condition", "all"),
     ],
+    "flat-numbers": [
+        *logs("bound", WAY_BACK, 1),
+        *("--way", "flat", "--condition", "height_difference"),
+        *("--alpha", "0.0055", "--beta", "18", "--leak", "0.12"),
+    ],
     "three-seeds": [
         *CHOOSING,
         *("--held-out", *FOREIGN),
         *("--condition", "paper", "touchdown_surprise"),
     ],
     "fresh-seed": [
-        *logs("trot", (*SMOOTH, "into-0.10"), 3),
-        *("--condition", "touchdown_surprise", "--alpha", "0.0158", "--beta", "15"),
+        *logs("trot", (*SMOOTH, "into-0.10"), 4),
+        *("--condition", "touchdown_surprise", "--alpha", "0.0124", "--beta", "8"),
     ],
     "our-numbers": [
         *SECOND,

@@ -37,8 +37,8 @@ CONDITIONS: dict[str, Condition] = {
     # Numbers of `gaitshift identify` (docs/results/shifting).
     "touchdown_surprise": Condition(
         statistic=TouchdownSurprise(),
-        alpha=0.0158,
-        beta=15.0,
+        alpha=0.0124,
+        beta=8.0,
         statistic_back=HeightDifference(),
         alpha_back=0.0055,
         beta_back=18.0,

@@ -1,5 +1,6 @@
 """How far from where the last touches let one expect it the ground ahead is met."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,13 +21,12 @@ AHEAD = 0.1
 RIDGE = 0.02
 """[m²]: a plane through touches that are near one line does not tilt across it at will."""
 
-LAGS = (1, 3)
-"""An error is held against the one before it, and the one three before it: of a trot's front feet,
-which take turns, against the other foot half a stride and one and a half strides ago."""
+LAG = 3
+"""An error is held against the one before it, and the one this many before it: of a trot's front
+feet, which take turns, against the other foot half a stride and one and a half strides ago."""
 
-SHARES = (0.85, 0.15)
-"""Powers of their deviations in the mean; noise differs most at the longer lag, slopes and steps
-least at the shorter one; ours, from a plateau of 0.1 to 0.15."""
+FROM_MEAN = math.sqrt(math.pi) / 2.0
+"""Deviation of normal errors over the mean size of their differences: 2/√π deviations."""
 
 STEEP = 0.08
 """Rise over run from which ground is steep: a slope of 5°; ours, noise of 10 cm seldom is."""
@@ -41,7 +41,6 @@ ASIDE_WINDOW = 1.0
 """How far it is off is a root mean square that forgets by e in this time [s]."""
 
 _HEADING = HeadingWatch()
-_SHARES = np.array(SHARES)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,8 +55,8 @@ class SurpriseState:
     """Mean square of how far it is off that [rad²]."""
     error: Float[np.ndarray, "N 4"]
     """The last errors, the last first [m]; NaN before that."""
-    square: Float[np.ndarray, "N 2"]
-    """Means of half the squares of their changes over each of `LAGS` [m²]."""
+    change: Float[np.ndarray, "N 2"]
+    """Mean sizes of their changes, over one touchdown and over `LAG` [m]."""
     steep: Float[np.ndarray, " N"]
     """Rise over run of the steepest of the last planes, the less the longer ago."""
 
@@ -68,12 +67,13 @@ class TouchdownSurprise:
 
     Each foot that comes down on new ground, ahead of all earlier touches, is held against the plane
     through those, along the vertical: that is its error. A slope has none; where it begins errors
-    grow and fade, and from one touchdown to the next they change little; a single step changes them
-    once; noise changes them at each touchdown. Root mean squares of their changes, over √2 (von
-    Neumann 1941), are the errors' own deviation where they know nothing of one another, and a drift
-    disturbs them little. The number is the geometric mean of two of them, over the last change and
-    over three touchdowns (`LAGS`, `SHARES`). Means start at 0: what was not seen is smooth. Feet
-    that come down where others stood before say nothing new, and do not count.
+    grow and fade; a single step changes them once; noise changes them at each touchdown. The number
+    is the errors' deviation by the mean size of their changes from one touchdown to the next (after
+    von Neumann 1941, who takes their squares, in which a single step weighs more). A drift, as at
+    the foot of a slope, is taken out: a change over n touchdowns has n times as much of it as one
+    over one, and so n² m₁² − mₙ², over n² − 1, of the means m has none, and is m₁² where errors
+    know nothing of one another (`LAG`, `FROM_MEAN`). Means start at 0: what was not seen is smooth.
+    Feet that come down where others stood before say nothing new, and do not count.
 
     Two things make it smaller. Where the ground was steep, its end is to be expected: the number is
     divided by how many times steeper than `STEEP` the plane was of late. And odometry by the feet
@@ -83,7 +83,7 @@ class TouchdownSurprise:
     Where no yaw is given, neither of the last two is done.
     """
 
-    touches: int = 3
+    touches: int = 4
     """Touches of each foot that the plane goes through."""
     memory: float = 10.0
     """Touchdowns on new ground in which the means forget by e; 1: the last change alone."""
@@ -109,8 +109,8 @@ class TouchdownSurprise:
             touches=self._memory.start(n),
             heading=_HEADING.start(n),
             aside=np.zeros(n),
-            error=np.full((n, 1 + max(LAGS)), np.nan),
-            square=np.zeros((n, len(LAGS))),
+            error=np.full((n, 1 + LAG), np.nan),
+            change=np.zeros((n, 2)),
             steep=np.zeros(n),
         )
 
@@ -122,12 +122,12 @@ class TouchdownSurprise:
         heading, off = _HEADING.step(state.heading, signals)
         share = min(1.0, signals.period / ASIDE_WINDOW)
         aside = state.aside + share * (off * off - state.aside)
-        error, square, steep = state.error, state.square, state.steep
+        error, change, steep = state.error, state.change, state.steep
         ids = np.flatnonzero(new.any(axis=1))
         if ids.size:
-            error, square, steep = error.copy(), square.copy(), steep.copy()
+            error, change, steep = error.copy(), change.copy(), steep.copy()
             above, slope, counts = _met(state.touches, touches, new, foot, ids)
-            error[ids], square[ids] = self._take_in(error[ids], square[ids], above, counts)
+            error[ids], change[ids] = self._take_in(error[ids], change[ids], above, counts)
             met = counts.sum(axis=1)
             kept = np.exp(-met / STEEP_FOR) * steep[ids]
             steep[ids] = np.where(met > 0, np.maximum(slope, kept), steep[ids])
@@ -136,10 +136,10 @@ class TouchdownSurprise:
             touch = np.where(thrown[:, None, None, None], np.nan, touches.touch)
             touches = replace(touches, touch=touch)
             error = np.where(thrown[:, None], np.nan, error)
-            square = np.where(thrown[:, None], 0.0, square)
+            change = np.where(thrown[:, None], 0.0, change)
             steep = np.where(thrown, 0.0, steep)
-        powers = np.sqrt(square) ** _SHARES
-        deviation = powers[:, 0] * powers[:, 1]
+        without_drift = (LAG**2 * change[:, 0] ** 2 - change[:, 1] ** 2) / (LAG**2 - 1)
+        deviation = FROM_MEAN * np.sqrt(np.maximum(without_drift, 0.0))
         aside_by = np.maximum(np.sqrt(aside) / STEADY, 1.0)
         value = deviation / aside_by / np.maximum(steep / STEEP, 1.0)
         known = ~np.isnan(error[:, -1])
@@ -148,7 +148,7 @@ class TouchdownSurprise:
             heading=heading,
             aside=aside,
             error=error,
-            square=square,
+            change=change,
             steep=steep,
         )
         return after, np.where(known, value, np.nan)[:, None]
@@ -156,18 +156,18 @@ class TouchdownSurprise:
     def _take_in(
         self,
         error: Float[np.ndarray, "K 4"],
-        square: Float[np.ndarray, "K 2"],
+        change: Float[np.ndarray, "K 2"],
         above: Float[np.ndarray, "K 4"],
         counts: Bool[np.ndarray, "K 4"],
     ) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, "K 2"]]:
         """Errors and means after the feet that count, `above` [m] where they were expected."""
         for leg in range(4):
-            change = above[:, leg, None] - error[:, [lag - 1 for lag in LAGS]]
-            taken = counts[:, leg, None] & ~np.isnan(change)
-            square = np.where(taken, square + (change**2 / 2.0 - square) / self.memory, square)
+            size = np.abs(above[:, leg, None] - error[:, [0, LAG - 1]])
+            taken = counts[:, leg, None] & ~np.isnan(size)
+            change = np.where(taken, change + (size - change) / self.memory, change)
             shifted = np.concatenate([above[:, leg, None], error[:, :-1]], axis=1)
             error = np.where(counts[:, leg, None], shifted, error)
-        return error, square
+        return error, change
 
 
 def _met(
