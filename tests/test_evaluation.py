@@ -190,15 +190,24 @@ def test_on_flat_ground_alone_no_gait_is_changed() -> None:
     assert all(summary["survived"] and not summary["switches"] for summary in summaries)
 
 
-@pytest.mark.parametrize(("gait", "speed"), [("bound", 1.0), ("pace", 1.2)])
-def test_the_speed_loop_brings_the_mean_speed_to_what_is_asked(gait: str, speed: float) -> None:
+@pytest.mark.parametrize(
+    ("gait", "speed", "within"),
+    [
+        ("bound", 1.0, 0.02),
+        ("pace", 1.2, 0.02),
+        ("bound", 1.2, 0.05),  # it would need more than the loop gives: the verdict's limit
+    ],
+)
+def test_the_speed_loop_brings_the_mean_speed_to_what_is_asked(
+    gait: str, speed: float, within: float
+) -> None:
     loaded, off = policy.load(gait), {}
     for open_loop in (True, False):
         config = EvaluationConfig(episodes=8, seconds=8, speed=speed, open_loop=open_loop)
         figures, log = evaluate(loaded, config)
         assert (log.command[..., 0] == speed).all(), "a log keeps what is wanted, not what is asked"
         off[open_loop] = abs(figures["speed_mean"] - speed)
-    assert off[False] < 0.02
+    assert off[False] < within
     assert off[False] < max(off[True], 0.01), "nearer than without it, unless that is near as well"
 
 

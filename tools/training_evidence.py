@@ -43,7 +43,7 @@ JUDGED = EvaluationConfig(episodes=64, seconds=12.0)
 SEEDS_HEAD = """# Fresh seeds
 
 The flat stage of the default recipe alone ({iterations} iterations, {steps:.1f} million control
-steps, about six minutes on one core), for {seeds} seeds; shipped are 0, and of bounds 1.
+steps, about six minutes on one core), for {seeds} seeds. Shipped gaits have seed 0, the bound 1.
 Each policy is judged on flat ground, 64 robots for 12 s, by the limits of `gaitshift evaluate`,
 whose speed loop trims the asked speed; open loop: the mean speed without it.
 This page is made by `python tools/training_evidence.py seeds --seeds {seeds}`.
