@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from gaitshift.identification import passages
-from gaitshift.legs import LEGS
-from gaitshift.switching import Condition, HeightDifference
+from gaitshift.lab.identification import passages
+from gaitshift.robot.legs import LEGS
+from gaitshift.shift import Condition, HeightDifference
 
 
 def write_example(path: Path) -> None:

@@ -11,9 +11,9 @@ import time
 
 import numpy as np
 
-from gaitshift import policy
-from gaitshift.motion import Motion
-from gaitshift.switching import Autonomous, Driver, GaitGraph
+from gaitshift.control import Autonomous, Driver, policy
+from gaitshift.robot.motion import Motion
+from gaitshift.shift import GaitGraph
 
 RNG = np.random.default_rng(0)
 STANCE = policy.load("trot").robot.stance_angles

@@ -3,7 +3,7 @@
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 
-from gaitshift.robot import ANYMAL_B
+from gaitshift.robot.description import ANYMAL_B
 
 
 def symmetric_robot(folder):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gaitshift.log import Log
+from gaitshift.lab.log import Log
 
 TABLE = {
     # gait: (touchdowns of each foot in one cycle [cycle], share of the cycle each is down)

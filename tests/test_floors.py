@@ -9,22 +9,18 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ON_A_ROBOT = (
-    "legs",
     "errors",
-    "motion",
-    "command",
-    "log",
-    "reward_machine",
-    "terrain",
+    "data",
     "robot",
-    "gaits",
-    "reward",
-    "observation",
-    "policy",
-    "switching",
-    "switching.height_difference",
-    "switching.graph",
-    "cpg",
+    "gait",
+    "gait.gaits",
+    "shift",
+    "control",
+    "control.policy",
+    "control.cpg",
+    "sim.reward",
+    "sim.terrain",
+    "lab.log",
 )
 """Modules that go onto a robot, where NumPy, onnxruntime and jaxtyping are all there is."""
 
@@ -69,13 +65,15 @@ def test_module_runs_without_mujoco_torch_and_gymnasium(module):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("module", ["world", "env", "evaluation", "benchmark.time_to_gait", "cli"])
+@pytest.mark.parametrize(
+    "module", ["sim.world", "sim.env", "lab.evaluation", "lab.benchmark.time_to_gait", "cli"]
+)
 def test_module_runs_without_torch(module):
     done = run_without(TORCH, f"import gaitshift.{module}")
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(("module", "needed"), [("world", "mujoco"), ("training.run", "torch")])
+@pytest.mark.parametrize(("module", "needed"), [("sim.world", "mujoco"), ("learn.run", "torch")])
 def test_a_blocked_package_is_missed_where_it_is_needed(module, needed):
     done = run_without((needed,), f"import gaitshift.{module}")
     assert done.returncode == 1
@@ -85,8 +83,8 @@ def test_a_blocked_package_is_missed_where_it_is_needed(module, needed):
 def test_condition_and_machine_work_where_they_are_all_there_is():
     program = """
 import numpy as np
-from gaitshift import gaits
-from gaitshift.switching import Condition, Signals
+from gaitshift.gait import gaits
+from gaitshift.shift import Condition, Signals
 condition = Condition(alpha=0.05, beta=11.0)
 state = condition.start(1)
 feet = np.zeros((1, 4, 3))
@@ -108,7 +106,7 @@ print(fired, gaits.load("trot").enter(np.array([[False, True, True, False]])))
 
 def test_reading_a_policy_asks_for_no_simulator():
     program = """
-from gaitshift import policy
+from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 try:
     policy.load("moonwalk")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gaitshift import policy
+from gaitshift.control import policy
 
 README = Path(__file__).parent.parent / "README.md"
 

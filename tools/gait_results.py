@@ -7,9 +7,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from gaitshift import gaits, policy
-from gaitshift.gait_analysis import FIRST_GAITS
-from gaitshift.legs import LEGS
+from gaitshift.control import policy
+from gaitshift.gait import gaits
+from gaitshift.lab.gait_analysis import FIRST_GAITS
+from gaitshift.robot.legs import LEGS
 
 POLICIES = Path(policy.__file__).parent / "policies"
 PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"

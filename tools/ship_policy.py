@@ -16,9 +16,9 @@ from typing import Any
 
 from gait_results import PAGE, page
 
-from gaitshift import policy
-from gaitshift.evaluation import SIZES, follow_commands, run_trials
-from gaitshift.plots import hildebrand_diagram, training_curves
+from gaitshift.control import policy
+from gaitshift.lab.evaluation import SIZES, follow_commands, run_trials
+from gaitshift.show.plots import hildebrand_diagram, training_curves
 
 POLICIES = Path(policy.__file__).parent / "policies"
 CURVES = Path(__file__).parent.parent / "docs" / "results" / "training"

@@ -19,19 +19,19 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift import gaits, policy
 from gaitshift.cli.output import progress
-from gaitshift.evaluation import EvaluationConfig, evaluate
-from gaitshift.gait_analysis import FIRST_GAITS
-from gaitshift.identification.statistics import wilson
-from gaitshift.reproduction.plan import Job
-from gaitshift.reproduction.pool import train_all
-from gaitshift.reproduction.settings import Setting
-from gaitshift.reward import ADDITIONS, BONUS_SHARES
-from gaitshift.reward_machine import RewardMachine
-from gaitshift.studies.transitions import Pair, run_pair
-from gaitshift.training.recipe import Recipe
-from gaitshift.training.run import POLICY
+from gaitshift.control import policy
+from gaitshift.gait import RewardMachine, gaits
+from gaitshift.lab.evaluation import EvaluationConfig, evaluate
+from gaitshift.lab.gait_analysis import FIRST_GAITS
+from gaitshift.lab.identification.statistics import wilson
+from gaitshift.lab.reproduction.plan import Job
+from gaitshift.lab.reproduction.pool import train_all
+from gaitshift.lab.reproduction.settings import Setting
+from gaitshift.lab.studies.transitions import Pair, run_pair
+from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.run import POLICY
+from gaitshift.sim.reward import ADDITIONS, BONUS_SHARES
 
 RUNS = Path("runs/evidence")
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
@@ -52,7 +52,7 @@ ADDITIONS_HEAD = """# The additions to Table I, taken away
 
 Trot by the first {iterations} iterations of the default recipe, on flat ground, whole and
 without each of the seven terms that the reward adds to the paper's Table I, and of the two manners
-of a change that the bonus depends on (`gaitshift.reward.ADDITIONS`, `BONUS_SHARES`): means over
+of a change that the bonus depends on (`gaitshift.sim.reward.ADDITIONS`, `BONUS_SHARES`): means over
 {seeds} seed(s) from 1 on, each policy judged on flat ground, 64 robots for 12 s. Clean: how many
 keep all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
 This page is made by `python tools/training_evidence.py additions --seeds {seeds}`.

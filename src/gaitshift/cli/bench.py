@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from gaitshift import policy
-from gaitshift.benchmark.outcome import (
+from gaitshift.cli.growing import kept_rows
+from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.control import policy
+from gaitshift.data import located
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.benchmark.outcome import (
     COLUMNS,
     Outcome,
     outcome_of,
@@ -15,15 +19,11 @@ from gaitshift.benchmark.outcome import (
     row_of,
     summary,
 )
-from gaitshift.benchmark.speed import SpeedConfig, environment_speed, training_speed
-from gaitshift.cli.growing import kept_rows
-from gaitshift.cli.output import emit_json, emit_table, progress, say
-from gaitshift.errors import GaitshiftError
-from gaitshift.reward_machine.reading import located
-from gaitshift.table import write_rows
+from gaitshift.lab.benchmark.speed import SpeedConfig, environment_speed, training_speed
+from gaitshift.lab.table import write_rows
 
 if TYPE_CHECKING:
-    from gaitshift.benchmark.time_to_gait import TimeToGait
+    from gaitshift.lab.benchmark.time_to_gait import TimeToGait
 
 TABLE, PICTURE = "time_to_gait.csv", "time_to_gait.png"
 
@@ -51,7 +51,7 @@ class TimeToGaitOptions:
 
     def config(self) -> "TimeToGait":
         """The measurement asked for."""
-        from gaitshift.benchmark.time_to_gait import TimeToGait
+        from gaitshift.lab.benchmark.time_to_gait import TimeToGait
 
         given = {
             name: getattr(self, name)
@@ -119,7 +119,7 @@ class Bench:
 
     def _measure_page(self) -> None:
         try:
-            from gaitshift.viewer.timing import ROBOTS, page_speed
+            from gaitshift.show.viewer.timing import ROBOTS, page_speed
         except ImportError as error:
             raise GaitshiftError(
                 f"the page needs the package '{error.name}'; install gaitshift[view]"
@@ -142,7 +142,7 @@ class Bench:
 
     def _measure_replay(self) -> None:
         try:
-            from gaitshift.benchmark.replay import ALPHAS, BETAS, EPISODES, replay_speed
+            from gaitshift.lab.benchmark.replay import ALPHAS, BETAS, EPISODES, replay_speed
         except ImportError as error:
             raise GaitshiftError(
                 f"the replay needs the package '{error.name}'; install gaitshift[identify]"
@@ -157,7 +157,7 @@ class Bench:
         )
 
     def _measure_time_to_gait(self) -> None:
-        from gaitshift.benchmark.time_to_gait import is_of, time_to_gait
+        from gaitshift.lab.benchmark.time_to_gait import is_of, time_to_gait
 
         options = self.time_to_gait
         config, out = options.config(), options.out
@@ -184,7 +184,7 @@ class Bench:
 
 
 def _draw(outcomes: list[Outcome], out: Path) -> None:
-    from gaitshift.plots import time_to_gait_figure  # matplotlib is slow to import
+    from gaitshift.show.plots import time_to_gait_figure  # matplotlib is slow to import
 
     time_to_gait_figure(outcomes, out / PICTURE)
 

@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import tyro
 
-from gaitshift import policy
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
+from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import DemoConfig, run_demo
-from gaitshift.log import Log
+from gaitshift.lab.evaluation import DemoConfig, run_demo
+from gaitshift.lab.log import Log
 
 PAGE, VIDEO, PICTURE = "index.html", "demo.mp4", "demo.png"
 LOG, SUMMARY = "log.npz", "summary.json"
@@ -107,19 +107,19 @@ class Demo(DemoConfig):
         }
 
     def _draw(self, log: Log) -> None:
-        from gaitshift.plots import demo_figure  # matplotlib is slow to import
+        from gaitshift.show.plots import demo_figure  # matplotlib is slow to import
 
         demo_figure(log, self.out / PICTURE)
 
     def _report(self, log: Log) -> None:
-        from gaitshift.report import write_report
+        from gaitshift.show.report import write_report
 
         video, command = self.out / VIDEO, shlex.join(["gaitshift", *sys.argv[1:]])
         facts = {"command": command, "seed": str(self.seed)}
         write_report(log, self.out / PAGE, video=video if self.video else None, facts=facts)
 
     def _render(self, log: Log) -> bool:
-        from gaitshift.video import VideoUnavailable, render
+        from gaitshift.show.video import VideoUnavailable, render
 
         try:
             with progress("filming") as report:

@@ -8,12 +8,12 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from gaitshift import gaits
-from gaitshift import policy as policies
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
-from gaitshift.cpg import CpgController
+from gaitshift.control import policy as policies
+from gaitshift.control.cpg import CpgController
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import (
+from gaitshift.gait import RewardMachine, gaits
+from gaitshift.lab.evaluation import (
     SIZES,
     EvaluationConfig,
     Followed,
@@ -22,10 +22,9 @@ from gaitshift.evaluation import (
     follow_commands,
     run_trials,
 )
-from gaitshift.evaluation.trials import Row
-from gaitshift.log import Log
-from gaitshift.reward_machine import RewardMachine
-from gaitshift.robot_file import use_robot_file
+from gaitshift.lab.evaluation.trials import Row
+from gaitshift.lab.log import Log
+from gaitshift.robot.robot_file import use_robot_file
 
 Judged = tuple[dict[str, Any], Log]
 """Figures, and the log that they are of."""
@@ -109,7 +108,7 @@ class Evaluate(EvaluationConfig):
             log.save(self.log)
             say(f"log written to {self.log}")
         if self.plot is not None:
-            from gaitshift.plots import hildebrand_diagram  # matplotlib is slow to import
+            from gaitshift.show.plots import hildebrand_diagram  # matplotlib is slow to import
 
             hildebrand_diagram(log, figures, machine, self.plot)
             say(f"diagram written to {self.plot}")
@@ -169,7 +168,7 @@ class Evaluate(EvaluationConfig):
             if path is not None and path.exists() and not self.overwrite:
                 raise GaitshiftError(f"{path} exists; give another {option}, or --overwrite")
         if self.plot is not None:
-            from gaitshift.plots.style import check_target
+            from gaitshift.show.plots.style import check_target
 
             check_target(self.plot)
         if self.controller == "cpg" and self.robot_file is not None:

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import tyro
 
-from gaitshift import gaits, policy
 from gaitshift.cli.output import check_folder, emit_json, say
-from gaitshift.reward_machine import RewardMachine, draw, mermaid
-from gaitshift.switching import GaitGraph
+from gaitshift.control import policy
+from gaitshift.gait import RewardMachine, draw, gaits, mermaid
+from gaitshift.shift import GaitGraph
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gaitshift.cli.output import check_folder
 from gaitshift.errors import GaitshiftError
-from gaitshift.table import Columns, Row, read_rows
+from gaitshift.lab.table import Columns, Row, read_rows
 
 README = "README.md"
 

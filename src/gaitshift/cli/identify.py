@@ -14,7 +14,7 @@ from gaitshift.cli.output import check_folder, emit_json, emit_table, say
 from gaitshift.errors import GaitshiftError
 
 if TYPE_CHECKING:
-    from gaitshift.identification.judging import Judged
+    from gaitshift.lab.identification.judging import Judged
 
 ROC, PAGE = "roc.png", "page.html"
 UNFINISHED = "unfinished"
@@ -58,8 +58,8 @@ class Identify:
     def run(self) -> None:
         """Tunes, judges, and writes the report."""
         try:
-            from gaitshift.identification import report as reports
-            from gaitshift.identification.task import Numbers, Task
+            from gaitshift.lab.identification import report as reports
+            from gaitshift.lab.identification.task import Numbers, Task
         except ImportError as error:
             raise GaitshiftError(
                 f"identify needs the package '{error.name}'; install gaitshift[identify]"
@@ -91,7 +91,7 @@ class Identify:
             held_out=bool(self.held_out),
             pictures=_draw(judged, self.out),
         )
-        from gaitshift.report.study_pages import write_identification_page
+        from gaitshift.show.report.study_pages import write_identification_page
 
         title, words = reports.introduction(judged, bool(self.held_out))
         page = self.out / PAGE
@@ -106,8 +106,8 @@ class Identify:
 
 def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
     """Draws the pictures into `out`: a line on each, by its file."""
-    from gaitshift.identification.report import hardest_first
-    from gaitshift.plots.identification import condition_map, roc_figure
+    from gaitshift.lab.identification.report import hardest_first
+    from gaitshift.show.plots.identification import condition_map, roc_figure
 
     pictures: dict[str, str] = {}
     for one in judged:

@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from gaitshift import policy as policies
 from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.control import policy as policies
+from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import EvaluationConfig, RolloutConfig
-from gaitshift.evaluation.courses import Course, run_course, select
-from gaitshift.log import Log
-from gaitshift.policy import Policy
+from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
+from gaitshift.lab.evaluation.courses import Course, run_course, select
+from gaitshift.lab.log import Log
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import tyro
 
-from gaitshift import policy as policies
 from gaitshift.cli.output import progress, say
+from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import EvaluationConfig, evaluate
-from gaitshift.log import Log
-from gaitshift.robot_file import use_robot_file
+from gaitshift.lab.evaluation import EvaluationConfig, evaluate
+from gaitshift.lab.log import Log
+from gaitshift.robot.robot_file import use_robot_file
 
 _TRACK, _SECONDS = "flat@5,perlin:0.1@12", 9.0
 """What policies of a training are shown on."""
@@ -59,13 +59,13 @@ class Report:
         if log is None:
             self._tell_training(path)
         else:
-            from gaitshift.report import write_report  # matplotlib is slow to import
+            from gaitshift.show.report import write_report  # matplotlib is slow to import
 
             write_report(log, path, robot=self.robot, video=self.video)
         print(path)
 
     def _tell_training(self, path: Path) -> None:
-        from gaitshift.report import write_training_report
+        from gaitshift.show.report import write_training_report
 
         final = self.source / "policy.onnx"
         if not final.is_file():
@@ -92,7 +92,7 @@ def _walk(policy: policies.Policy) -> Log:
 def _checkpoints(folder: Path) -> list[tuple[str, Log]]:
     """Walks of policies from the run's checkpoints, about evenly spread; none without torch."""
     try:
-        from gaitshift.training.run import Run
+        from gaitshift.learn.run import Run
     except ImportError as error:
         say(f"checkpoints are left out: they need '{error.name}' (gaitshift[train])")
         return []

@@ -43,11 +43,11 @@ class Reproduce:
     def run(self) -> None:
         """Trains what is missing, and writes the report."""
         try:
-            from gaitshift.reproduction.plan import Plan
-            from gaitshift.reproduction.pool import train_all
-            from gaitshift.reproduction.report import write_report
-            from gaitshift.reproduction.results import Results
-            from gaitshift.reproduction.told import Told
+            from gaitshift.lab.reproduction.plan import Plan
+            from gaitshift.lab.reproduction.pool import train_all
+            from gaitshift.lab.reproduction.results import Results
+            from gaitshift.lab.reproduction.told import Told
+            from gaitshift.show.report.reproduction import write_report
         except ImportError as error:
             raise GaitshiftError(
                 f"training needs the package '{error.name}'; install gaitshift[train]"

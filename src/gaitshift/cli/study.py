@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gaitshift import policy as policies
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
-from gaitshift.switching import CONDITIONS
-from gaitshift.table import write_rows
+from gaitshift.lab.table import write_rows
+from gaitshift.shift import CONDITIONS
 
 TABLE = "crossings.csv"
 
@@ -47,8 +47,8 @@ class Study:
     def run(self) -> None:
         """Crosses, and tells what came of it."""
         try:
-            from gaitshift.studies.crossing import cross, ways
-            from gaitshift.studies.crossing_table import COLUMNS, PICTURE, is_of, page, row_of
+            from gaitshift.lab.studies.crossing import cross, ways
+            from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, is_of, page, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"study needs the package '{error.name}'; install gaitshift[identify]"
@@ -83,7 +83,7 @@ class Study:
                     )
                 rows.append(row_of(way, amplitude, self.seed, crossings))
                 write_rows(path, COLUMNS, rows)
-        from gaitshift.plots.crossings import crossings_figure  # matplotlib is slow to import
+        from gaitshift.show.plots.crossings import crossings_figure  # matplotlib is slow to import
 
         crossings_figure(rows, self.out / PICTURE)
         command = shlex.join(["gaitshift", *sys.argv[1:]])

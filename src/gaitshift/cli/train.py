@@ -11,14 +11,14 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from gaitshift import gaits
 from gaitshift.cli.output import emit_json, say
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import glance
-from gaitshift.robot_file import use_robot_file
+from gaitshift.gait import gaits
+from gaitshift.lab.evaluation import glance
+from gaitshift.robot.robot_file import use_robot_file
 
 if TYPE_CHECKING:
-    from gaitshift.training.run import Row, Run
+    from gaitshift.learn.run import Row, Run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +73,8 @@ class Train:
 
     def _open(self) -> "Run":
         try:
-            from gaitshift.training.recipe import PRESETS
-            from gaitshift.training.run import Run
+            from gaitshift.learn.recipe import PRESETS
+            from gaitshift.learn.run import Run
         except ImportError as error:
             raise GaitshiftError(
                 f"training needs the package '{error.name}'; install gaitshift[train]"
@@ -117,8 +117,8 @@ class _Bar:
     """Progress of a training: steps/s, speed, survival, the last verdict and time left."""
 
     def __init__(self, run: "Run") -> None:
-        from gaitshift.training.lines import last
-        from gaitshift.training.run import PROGRESS, VERDICTS
+        from gaitshift.learn.lines import last
+        from gaitshift.learn.run import PROGRESS, VERDICTS
 
         self.row: Row = last(run.folder / PROGRESS, run.iteration)
         """The last line of progress.csv."""

@@ -9,12 +9,12 @@ from typing import Annotated, Any
 
 import tyro
 
-from gaitshift import policy as policies
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
-from gaitshift.table import write_rows
-from gaitshift.terrain import from_spec
+from gaitshift.lab.table import write_rows
+from gaitshift.sim.terrain import from_spec
 
 TABLE, PAGE = "transitions.csv", "page.html"
 
@@ -47,9 +47,9 @@ class Transitions:
     def run(self) -> None:
         """Shifts, and tells what came of it."""
         try:
-            from gaitshift.studies import Pair, run_pair
-            from gaitshift.studies.transition_page import page
-            from gaitshift.studies.transition_table import COLUMNS, is_of, row_of
+            from gaitshift.lab.studies import Pair, run_pair
+            from gaitshift.lab.studies.transition_page import page
+            from gaitshift.lab.studies.transition_table import COLUMNS, is_of, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
@@ -89,7 +89,7 @@ class Transitions:
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         (self.out / README).write_text(page(rows, command))
-        from gaitshift.report.study_pages import write_transition_page
+        from gaitshift.show.report.study_pages import write_transition_page
 
         write_transition_page(rows, self.out / PAGE, command=command)
         if self.json:
@@ -99,8 +99,8 @@ class Transitions:
 
     def _draw(self, rows: list[dict[str, Any]]) -> None:
         """A map a ground, of all that the table has."""
-        from gaitshift.plots.transitions import transition_map  # matplotlib is slow to import
-        from gaitshift.studies.transition_page import picture_of
+        from gaitshift.lab.studies.transition_page import picture_of
+        from gaitshift.show.plots.transitions import transition_map  # matplotlib is slow to import
 
         for ground in dict.fromkeys(row["ground"] for row in rows):
             of = [row for row in rows if row["ground"] == ground]

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import tyro
 
-from gaitshift import policy as policies
 from gaitshift.cli.output import say
+from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
-from gaitshift.evaluation import DemoConfig
-from gaitshift.log import Log
-from gaitshift.robot import ANYMAL_B
-from gaitshift.robot_file import use_robot_file
-from gaitshift.switching import load_condition
+from gaitshift.lab.evaluation import DemoConfig
+from gaitshift.lab.log import Log
+from gaitshift.robot.description import ANYMAL_B
+from gaitshift.robot.robot_file import use_robot_file
+from gaitshift.shift import load_condition
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 
@@ -47,8 +47,15 @@ class View:
     def run(self) -> None:
         """Opens the page, and keeps it until Ctrl-C."""
         try:
-            from gaitshift.geometry import has_meshes
-            from gaitshift.viewer import LiveConfig, LivePage, LiveRun, ReplayPage, close, serve
+            from gaitshift.show.geometry import has_meshes
+            from gaitshift.show.viewer import (
+                LiveConfig,
+                LivePage,
+                LiveRun,
+                ReplayPage,
+                close,
+                serve,
+            )
         except ImportError as error:
             raise GaitshiftError(
                 f"view needs the package '{error.name}'; install gaitshift[view]"
@@ -84,7 +91,7 @@ class View:
 
     def _save(self, log: Log) -> str:
         """Keeps a recording as a log and as a page; older ones stay."""
-        from gaitshift.report import write_report  # matplotlib is slow to import
+        from gaitshift.show.report import write_report  # matplotlib is slow to import
 
         self.out.mkdir(parents=True, exist_ok=True)
         number = 1

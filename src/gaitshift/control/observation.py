@@ -1,0 +1,195 @@
+"""The observation S × U as named slices (paper III-D), and its mirror image.
+
+The paper's S is (u, δ, q, q̇, z, φ, v, ω, f). `PAPER_SLICES` is exactly that; `DEFAULT_SLICES` adds
+the command and the last action, which the default reward speaks of, and the heights at which the
+feet last touched, by which a policy knows rough ground from flat.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Float32, Int
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine
+from gaitshift.robot.command import Command
+from gaitshift.robot.legs import MIRRORED_LEGS
+from gaitshift.robot.motion import Motion
+
+
+@dataclass(frozen=True, kw_only=True)
+class Situation:
+    """All that an observation may show of N robots at one instant."""
+
+    machine_state: Int[np.ndarray, " N"]
+    steps_in_state: Int[np.ndarray, " N"]
+    motion: Motion
+    command: Command
+    last_action: Float[np.ndarray, "N 12"]
+    """The action that led here, zero after a reset."""
+    stance: Float[np.ndarray, " 12"]
+    """The robot's default joint angles [rad]."""
+    touch_height: Float[np.ndarray, "N 4"]
+    """Height of each foot from the base when it last touched [m], as `last_touch` keeps it."""
+
+
+def last_touch(
+    motion: Motion, before: Float[np.ndarray, "N 4"] | None = None
+) -> Float[np.ndarray, "N 4"]:
+    """Height of each foot from the base when it last touched, along the vertical [m].
+
+    The paper's h (III-E), which the shift condition watches, as something the policy sees too.
+    `before` is what it was a step ago; None: every foot is taken as it stands now.
+    """
+    height = motion.foot_height
+    return height.copy() if before is None else np.where(motion.contact, height, before)
+
+
+@dataclass(frozen=True)
+class _Slice:
+    size: int
+    read: Callable[[Situation], np.ndarray]
+    mirror: tuple[tuple[int, ...], tuple[int, ...]]
+    """Order and signs of the entries as seen in a mirror (left and right changed)."""
+
+
+_JOINT_ORDER = tuple(3 * leg + joint for leg in MIRRORED_LEGS for joint in range(3))
+_JOINT_SIGNS = (-1, 1, 1) * 4
+JOINT_MIRROR = (_JOINT_ORDER, _JOINT_SIGNS)
+"""Mirror image of a joint vector: legs change sides, hip abduction changes sign."""
+
+STEP_SCALE = 0.05
+"""δ is shown in units of 20 control steps and saturates at 5 units: ours, to keep inputs near 1."""
+
+
+TOUCH_SCALE = 10.0
+"""Differences of touch heights are shown in units of 10 cm and saturate at 4 units: ours."""
+
+
+def _touch_differences(s: Situation) -> np.ndarray:
+    difference = s.touch_height - s.touch_height.mean(axis=1, keepdims=True)
+    return np.clip(TOUCH_SCALE * difference, -4.0, 4.0)
+
+
+def _machine_slice(machine: RewardMachine) -> _Slice:
+    count = len(machine.states)
+    one_hot = np.eye(count)
+    mirrored = machine.mirrored_states() or tuple(range(count))
+    return _Slice(count, lambda s: one_hot[s.machine_state], (mirrored, (1,) * count))
+
+
+def _wait_slice(machine: RewardMachine) -> _Slice:
+    def read(s: Situation) -> np.ndarray:
+        dwell = machine.dwell_for(s.command.stride)
+        return STEP_SCALE * machine.wait(s.machine_state, s.steps_in_state, dwell)
+
+    return _column(read)
+
+
+def _column(read: Callable[[Situation], np.ndarray], sign: int = 1) -> _Slice:
+    return _Slice(1, lambda s: read(s)[:, None], ((0,), (sign,)))
+
+
+def _vector(read: Callable[[Situation], np.ndarray], *signs: int) -> _Slice:
+    return _Slice(len(signs), read, (tuple(range(len(signs))), signs))
+
+
+_SLICES: dict[str, _Slice] = {
+    "steps_in_state": _column(lambda s: np.minimum(STEP_SCALE * s.steps_in_state, 5.0)),
+    "joint_position": _Slice(12, lambda s: s.motion.joint_position - s.stance, JOINT_MIRROR),
+    "joint_velocity": _Slice(12, lambda s: 0.1 * s.motion.joint_velocity, JOINT_MIRROR),
+    "base_height": _column(lambda s: s.motion.base_height),
+    "gravity_b": _vector(lambda s: s.motion.gravity_b, 1, -1, 1),
+    "base_linear_velocity_b": _vector(lambda s: s.motion.base_linear_velocity_b, 1, -1, 1),
+    "base_angular_velocity_b": _vector(lambda s: s.motion.base_angular_velocity_b, -1, 1, -1),
+    "contact": _Slice(4, lambda s: s.motion.contact, (MIRRORED_LEGS, (1,) * 4)),
+    "forward_speed_command": _column(lambda s: s.command.forward_speed),
+    "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
+    "stride_command": _column(lambda s: STEP_SCALE * s.command.stride),
+    "last_action": _Slice(12, lambda s: s.last_action, JOINT_MIRROR),
+    "touch_height": _Slice(4, _touch_differences, (MIRRORED_LEGS, (1,) * 4)),
+}
+
+_MACHINE_SLICES = {"machine_state": _machine_slice, "wait": _wait_slice}
+"""Slices that depend on the machine."""
+
+PAPER_SLICES = (
+    "machine_state",
+    "steps_in_state",
+    "joint_position",
+    "joint_velocity",
+    "base_height",
+    "gravity_b",
+    "base_linear_velocity_b",
+    "base_angular_velocity_b",
+    "contact",
+)
+"""(u, δ, q, q̇, z, φ, v, ω, f); φ is the direction of gravity, which knows roll and pitch only."""
+
+DEFAULT_SLICES = (
+    *PAPER_SLICES,
+    "forward_speed_command",
+    "yaw_rate_command",
+    "stride_command",
+    "wait",
+    "last_action",
+    "touch_height",
+)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Which slices are observed, in which order, for one machine."""
+
+    machine: RewardMachine
+    names: tuple[str, ...] = DEFAULT_SLICES
+
+    def __post_init__(self) -> None:
+        known = (*_MACHINE_SLICES, *_SLICES)
+        unknown = [name for name in self.names if name not in known]
+        if unknown:
+            raise GaitshiftError(
+                f"unknown observation slice '{unknown[0]}'; known: {', '.join(known)}"
+            )
+
+    @cached_property
+    def _parts(self) -> tuple[_Slice, ...]:
+        return tuple(
+            _MACHINE_SLICES[n](self.machine) if n in _MACHINE_SLICES else _SLICES[n]
+            for n in self.names
+        )
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Where each named slice stands in the observation vector."""
+        ends = np.cumsum([part.size for part in self._parts])
+        return {
+            name: slice(int(end) - part.size, int(end))
+            for name, part, end in zip(self.names, self._parts, ends, strict=True)
+        }
+
+    @property
+    def size(self) -> int:
+        """Length of the observation vector."""
+        return sum(part.size for part in self._parts)
+
+    def __call__(self, situation: Situation) -> Float32[np.ndarray, "N D"]:
+        """The observation of N robots."""
+        n = len(situation.machine_state)
+        observation = np.empty((n, self.size), dtype=np.float32)
+        for part, where in zip(self._parts, self.slices.values(), strict=True):
+            observation[:, where] = part.read(situation)
+        return observation
+
+    @cached_property
+    def mirror(self) -> tuple[Int[np.ndarray, " D"], Float32[np.ndarray, " D"]]:
+        """Order and signs such that `signs * observation[:, order]` is what a mirror would show."""
+        order = [
+            where.start + index
+            for part, where in zip(self._parts, self.slices.values(), strict=True)
+            for index in part.mirror[0]
+        ]
+        signs = [sign for part in self._parts for sign in part.mirror[1]]
+        return np.array(order), np.array(signs, dtype=np.float32)

@@ -1,0 +1,160 @@
+"""A policy file: one ONNX network with all that is needed to run it, and checks that it fits."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import onnxruntime
+from jaxtyping import Float, Float32
+
+from gaitshift.control.observation import Observation
+from gaitshift.control.policy_info import PolicyInfo, read_info
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine
+from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.description import ROBOTS, Robot
+
+_SHIPPED = Path(__file__).parent / "policies"
+
+_ONLY_WHAT_IS_ASKED: Any = cast(Any, onnxruntime).RunOptions()
+_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True  # the critic rests while the actor acts
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A trained policy: observation in, action out, by onnxruntime without torch."""
+
+    path: Path
+    info: PolicyInfo
+    machine: RewardMachine
+    session: onnxruntime.InferenceSession
+
+    @property
+    def robot(self) -> Robot:
+        """The robot it drives."""
+        return ROBOTS[self.info.robot]
+
+    @property
+    def gait(self) -> str:
+        """Name of the gait."""
+        return self.machine.name
+
+    @cached_property
+    def observation(self) -> Observation:
+        """The observation it wants."""
+        return Observation(self.machine, tuple(self.info.observation))
+
+    def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
+        """The deterministic actions for N observations."""
+        return self._run("action", observation)
+
+    @cached_property
+    def has_critic(self) -> bool:
+        """Whether the file has the critic that the policy was trained with."""
+        return "value" in {output.name for output in cast(Any, self.session).get_outputs()}
+
+    def value(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, " N"]:
+        """What the critic expects from N observations on: scaled rewards to come, discounted.
+
+        Raises:
+            GaitshiftError: the file has no critic.
+        """
+        if not self.has_critic:
+            raise GaitshiftError(f"{self.path} has no critic; export it anew from its run")
+        return self._run("value", observation)[:, 0]
+
+    def _run(self, output: str, observation: np.ndarray) -> np.ndarray:
+        options = _ONLY_WHAT_IS_ASKED
+        return cast(Any, self.session).run([output], {"observation": observation}, options)[0]
+
+    def target(self, action: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "N 12"]:
+        """Joint targets [rad] of an action."""
+        return np.asarray(self.info.stance) + self.info.action_scale * action
+
+
+def shipped() -> tuple[str, ...]:
+    """Names of the gaits whose policies come with the package."""
+    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.onnx")))
+
+
+def load(name_or_path: str | Path) -> Policy:
+    """A shipped policy by the name of its gait, or any policy file.
+
+    Raises:
+        GaitshiftError: no such policy; not a whole ONNX file; not one of gaitshift's; of another
+            format version or robot; or its parts contradict each other.
+    """
+    path = Path(name_or_path)
+    if path.suffix != ".onnx":
+        path = _SHIPPED / f"{name_or_path}.onnx"
+        if not path.is_file():
+            raise GaitshiftError(
+                f"no policy '{name_or_path}'; shipped: {', '.join(shipped())}; or give a .onnx file"
+            )
+    if not path.is_file():
+        raise GaitshiftError(f"no policy file {path}")
+    session = _open(path)
+    info = read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
+    try:
+        policy = Policy(path, info, RewardMachine.from_dict(info.machine), session)
+        _check(policy)
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{path}: {error}") from error
+    return policy
+
+
+def _open(path: Path) -> onnxruntime.InferenceSession:
+    options = cast(Any, onnxruntime).SessionOptions()
+    options.intra_op_num_threads = 1  # the networks are small, the cores belong to the physics
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime has a class for each fault, without a common base
+        raise GaitshiftError(
+            f"{path} is not a whole ONNX file (truncated or damaged); export it anew"
+        ) from error
+
+
+def _check(policy: Policy) -> None:
+    """Refuses a policy whose robot is unknown or whose parts contradict each other."""
+    info = policy.info
+    session: Any = policy.session
+    inputs, outputs = (
+        {one.name: one.shape for one in ends}
+        for ends in (session.get_inputs(), session.get_outputs())
+    )
+    for kind, name, there in (("input", "observation", inputs), ("output", "action", outputs)):
+        if name not in there or len(there[name]) != 2:
+            raise GaitshiftError(
+                f"its network has no {kind} '{name}' of N rows; export it anew from its run"
+            )
+    if outputs["action"][1] != 12:
+        raise GaitshiftError(
+            f"its network gives {outputs['action'][1]} actions; 12, one a joint, would be right"
+        )
+    if info.robot not in ROBOTS:
+        raise GaitshiftError(
+            f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}; any other one needs "
+            "its file (--robot-file)"
+        )
+    if info.control_rate != 1.0 / CONTROL_PERIOD:
+        raise GaitshiftError(
+            f"it acts {info.control_rate:g} times a second; {1.0 / CONTROL_PERIOD:g} would be right"
+        )
+    robot = policy.robot
+    gains = robot.gains_of(info.gains)
+    if (gains.kp, gains.kd) != (info.kp, info.kd):
+        raise GaitshiftError(
+            f"it was trained with kp {info.kp}, kd {info.kd}, but the preset '{info.gains}' "
+            f"of {robot.name} is kp {gains.kp}, kd {gains.kd}"
+        )
+    if list(robot.stance) != info.stance:
+        raise GaitshiftError(f"it was trained from another stance of {robot.name}")
+    expected = {name: [s.start, s.stop] for name, s in policy.observation.slices.items()}
+    wanted = inputs["observation"][1]
+    if expected != info.observation or wanted != policy.observation.size:
+        raise GaitshiftError(
+            f"its observation slices do not add up to its network's {wanted} inputs"
+        )

@@ -1,0 +1,152 @@
+"""What stands in a policy file beside its network, read with care."""
+
+import json
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from reprlib import repr as shortened
+from typing import Any, cast
+
+from gaitshift.data import Table
+from gaitshift.errors import GaitshiftError
+
+FORMAT_VERSION = 2
+"""Raised when a file of an earlier version could be misread."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyInfo:
+    """What stands in a policy file beside the network."""
+
+    robot: str
+    """Name of the robot it was trained for."""
+    machine: dict[str, Any]
+    """The reward machine, whole (`RewardMachine.to_dict`)."""
+    observation: dict[str, list[int]]
+    """Start and end of each named slice of the observation."""
+    action_scale: float
+    """Joint target = stance + action_scale · action [rad]."""
+    stance: list[float]
+    """The robot's default joint angles [rad]."""
+    gains: str
+    """Preset of the robot's joint gains."""
+    kp: float
+    """[N·m/rad]"""
+    kd: float
+    """[N·m·s/rad]"""
+    control_rate: float
+    """Control steps a second [Hz]."""
+    forward_speed: float
+    """Nominal forward speed [m/s]."""
+    speed_range: list[float]
+    """Least and greatest forward speed that it was trained for [m/s]."""
+    stride_frequency: float
+    """Nominal stride frequency [Hz]."""
+    stride_frequency_range: list[float]
+    """Least and greatest stride frequency that it was trained for [Hz]."""
+    training: dict[str, Any]
+    """Command, seed, versions and figures of the training that made it."""
+    format_version: int = FORMAT_VERSION
+
+    def to_metadata(self) -> dict[str, str]:
+        """As ONNX keeps it: every value a JSON text."""
+        return {f"gaitshift.{key}": json.dumps(value) for key, value in vars(self).items()}
+
+
+def read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
+    """The description in an ONNX file's metadata, each value of its type and size.
+
+    Raises:
+        GaitshiftError: the file is none of gaitshift's, or of another version, or a value is
+            missing or not what it should be.
+    """
+    version = metadata.get("gaitshift.format_version")
+    if version is None:
+        raise GaitshiftError(f"{path} is an ONNX file, but not a policy of gaitshift")
+    if version != str(FORMAT_VERSION):
+        raise GaitshiftError(
+            f"{path} has format version {version}; this gaitshift reads {FORMAT_VERSION}: "
+            "export it with this version"
+        )
+    fields = PolicyInfo.__dataclass_fields__
+    missing = [name for name in fields if f"gaitshift.{name}" not in metadata]
+    if missing:
+        raise GaitshiftError(f"{path} lacks the metadata '{missing[0]}'; export it anew")
+    try:
+        values = {name: json.loads(metadata[f"gaitshift.{name}"]) for name in fields}
+    except json.JSONDecodeError as error:
+        raise GaitshiftError(f"{path} has damaged metadata; export it anew") from error
+    try:
+        return _info_of(values)
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{path}: metadata {error}; export it anew") from error
+
+
+def _info_of(values: dict[str, object]) -> PolicyInfo:
+    """The description in plain data, each value of its type and size.
+
+    Raises:
+        GaitshiftError: one that is not, by its key.
+    """
+    read = Table(values, keys=tuple(PolicyInfo.__dataclass_fields__))
+    info = PolicyInfo(
+        robot=read.text("robot"),
+        machine=_table(values, "machine"),
+        observation={
+            name: _ends(name, ends) for name, ends in _table(values, "observation").items()
+        },
+        action_scale=_above_0(read, "action_scale"),
+        stance=_angles(read, "stance"),
+        gains=read.text("gains"),
+        kp=read.number("kp"),
+        kd=read.number("kd"),
+        control_rate=_above_0(read, "control_rate"),
+        forward_speed=_above_0(read, "forward_speed"),
+        speed_range=_range(read, "speed_range"),
+        stride_frequency=_above_0(read, "stride_frequency"),
+        stride_frequency_range=_range(read, "stride_frequency_range"),
+        training=_table(values, "training"),
+        format_version=read.whole("format_version"),
+    )
+    if info.stride_frequency_range[0] == 0:
+        raise GaitshiftError("'stride_frequency_range' must begin above 0")
+    return info
+
+
+def _table(values: dict[str, object], key: str) -> dict[str, Any]:
+    value = values[key]
+    if not isinstance(value, dict):
+        raise GaitshiftError(f"{key!r} must be a table of keys and values, not {shortened(value)}")
+    return cast("dict[str, Any]", value)
+
+
+def _ends(name: str, ends: object) -> list[int]:
+    whole: list[int] = []
+    if isinstance(ends, list):
+        whole = [end for end in cast("list[object]", ends) if type(end) is int]
+    if len(whole) != 2 or ends != whole:
+        told = shortened(cast(object, ends))
+        raise GaitshiftError(f"'observation' must give {name!r} a start and an end, not {told}")
+    return whole
+
+
+def _above_0(read: Table, key: str) -> float:
+    value = read.number(key)
+    if not 0 < value < inf:
+        raise GaitshiftError(f"{key!r} must be a finite number above 0, not {value:g}")
+    return value
+
+
+def _angles(read: Table, key: str) -> list[float]:
+    value = read.get(key)
+    count = len(cast("list[object]", value)) if isinstance(value, list) else 12
+    return list(read.numbers(key, count, "the angles of 12 joints"))
+
+
+def _range(read: Table, key: str) -> list[float]:
+    low, high = read.numbers(key, 2, "two numbers, such as [0.4, 1.6]")
+    if not 0 <= low <= high < inf:
+        raise GaitshiftError(
+            f"{key!r} must be two finite numbers, 0 or above and rising, not {low:g} to {high:g}"
+        )
+    return [low, high]

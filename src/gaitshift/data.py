@@ -1,0 +1,169 @@
+"""Reads TOML files table by table and key by key; an error names the place and what is allowed."""
+
+import tomllib
+from collections.abc import Generator
+from contextlib import contextmanager
+from difflib import get_close_matches
+from pathlib import Path
+from reprlib import repr as shortened
+from typing import cast
+
+from gaitshift.errors import GaitshiftError
+
+
+def tables_in(path: Path) -> dict[str, object]:
+    """The tables of a TOML file; `GaitshiftError`, without its path, where there are none."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise GaitshiftError("there is no such file") from None
+    except OSError as error:
+        raise GaitshiftError(f"the file cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise GaitshiftError("this is not a TOML file: it is not UTF-8 text") from None
+    try:
+        tables = tomllib.loads(text)
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
+        raise GaitshiftError(f"this is not a TOML file: {error}") from None
+    if not tables:
+        raise GaitshiftError("the file is empty")
+    return tables
+
+
+@contextmanager
+def located(where: str) -> Generator[None]:
+    """Put the place, such as "transition 2 (FL_BR -> FR_BL)", before any error raised inside."""
+    try:
+        yield
+    except GaitshiftError as error:
+        raise GaitshiftError(f"{where}: {error}") from None
+
+
+def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
+    """Say in one line what is unknown, what may have been meant and what is known."""
+    close = get_close_matches(name, known, n=1)
+    meant = f" did you mean {close[0]!r}?" if close else ""
+    return f"unknown {kind} {name!r};{meant} {kind}s are {', '.join(known)}"
+
+
+class Table:
+    """One table of a gait file: its keys are all known, its values are asked for by type.
+
+    Every method raises a `GaitshiftError` naming the key where the value is missing or of
+    another type. A default makes the key optional.
+    """
+
+    def __init__(self, data: object, *, keys: tuple[str, ...]):
+        if not isinstance(data, dict):
+            raise GaitshiftError(f"must be a table of keys and values, not {shortened(data)}")
+        self._values = cast(dict[str, object], data)
+        for key in self._values:
+            if key not in keys:
+                raise GaitshiftError(known_names("key", str(key), keys))
+
+    def has(self, key: str) -> bool:
+        """Whether the key is given."""
+        return key in self._values
+
+    def get(self, key: str) -> object:
+        """Return the value as it stands."""
+        if key not in self._values:
+            raise GaitshiftError(f"key {key!r} is missing")
+        return self._values[key]
+
+    def text(self, key: str) -> str:
+        """Return a string that says something."""
+        value = self.get(key)
+        if not isinstance(value, str) or not value.strip():
+            raise _wrong(key, "a text", value)
+        return value
+
+    def flag(self, key: str, *, default: bool) -> bool:
+        """Return true or false."""
+        value = self._values.get(key, default)
+        if not isinstance(value, bool):
+            raise _wrong(key, "true or false", value)
+        return value
+
+    def whole(self, key: str, *, default: int | None = None) -> int:
+        """Return a whole number."""
+        value = self.get(key) if default is None else self._values.get(key, default)
+        if not isinstance(value, int) or isinstance(value, bool):
+            raise _wrong(key, "a whole number", value)
+        return value
+
+    def number(self, key: str, *, default: float | None = None) -> float:
+        """Return a number, whole or not."""
+        value = self.get(key) if default is None else self._values.get(key, default)
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            raise _wrong(key, "a number", value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise _wrong(key, "a number of a usual size", value) from None
+
+    def pair(self, key: str, *, default: tuple[float, float]) -> tuple[float, float]:
+        """Return two numbers, the lower and the upper end of a range."""
+        wanted = "two numbers, such as [0.4, 1.6]"
+        ends: list[object] = self._list(key, wanted) if self.has(key) else [*default]
+        if len(ends) != 2:
+            raise _wrong(key, wanted, ends)
+        low, high = self._numbers(key, ends, wanted)
+        return low, high
+
+    def numbers(self, key: str, count: int, wanted: str) -> tuple[float, ...]:
+        """Return a list of so many numbers; `wanted` says what they are."""
+        values = self._list(key, wanted)
+        if len(values) != count:
+            raise _wrong(key, wanted, values)
+        return tuple(self._numbers(key, values, wanted))
+
+    def feet(self, key: str) -> frozenset[str]:
+        """Return a list of feet, each named once."""
+        names = self._list(key, 'a list of feet, such as ["FL", "BR"]')
+        for name in names:
+            if not isinstance(name, str):
+                raise _wrong(key, 'a list of feet, such as ["FL", "BR"]', names)
+            if names.count(name) > 1:
+                raise GaitshiftError(f"{key!r} names {name} twice")
+        return frozenset(cast(list[str], names))
+
+    def table(self, key: str) -> dict[str, object]:
+        """Return a table of tables, [key.NAME] in TOML, each still to be read."""
+        value = self.get(key)
+        if isinstance(value, dict) and value:
+            return cast(dict[str, object], value)
+        raise _wrong(key, f"tables with names, [{key}.NAME]", cast(object, value))
+
+    def points(self, key: str) -> tuple[tuple[float, float], ...]:
+        """Return a list of pairs of numbers."""
+        wanted = "pairs of numbers, such as [[0.4, 0.8], [1.2, 1.0]]"
+        pairs = self._list(key, wanted)
+        for pair in pairs:
+            if not isinstance(pair, list) or len(cast(list[object], pair)) != 2:
+                raise _wrong(key, wanted, pairs)
+        read = (self._numbers(key, cast(list[object], pair), wanted) for pair in pairs)
+        return tuple((first, second) for first, second in read)
+
+    def tables(self, key: str) -> list[object]:
+        """Return a list of tables, [[key]] in TOML, each still to be read."""
+        return self._list(key, f"a list of tables, [[{key}]]")
+
+    @staticmethod
+    def _numbers(key: str, values: list[object], wanted: str) -> list[float]:
+        if not all(type(value) in (int, float) for value in values):
+            raise _wrong(key, wanted, values)
+        try:
+            return [float(value) for value in cast(list[float], values)]
+        except OverflowError:
+            raise _wrong(key, "two numbers of a usual size", values) from None
+
+    def _list(self, key: str, wanted: str) -> list[object]:
+        value = self.get(key)
+        if not isinstance(value, list):
+            raise _wrong(key, wanted, value)
+        return cast(list[object], value)
+
+
+def _wrong(key: str, wanted: str, value: object) -> GaitshiftError:
+    return GaitshiftError(f"{key!r} must be {wanted}, not {shortened(value)}")

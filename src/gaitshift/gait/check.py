@@ -1,0 +1,117 @@
+"""The laws that every machine keeps, checked before anything runs on it.
+
+1. States have names of their own, and edges join states that exist.
+2. A state has a way out, or it is accepting and has none.
+3. Every state is reached from the initial one.
+4. Two guards of one source state never hold at once, so δu is a function.
+5. A guard does not hold in the stance of its source, or standing still would leave the state; and
+   one guard on the way between two states holds in the stance of the target. So a state is the
+   stance that was shown last.
+"""
+
+from itertools import combinations
+
+from gaitshift.data import known_names
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait.edge import Edge
+from gaitshift.gait.feet import feet_text
+from gaitshift.gait.state import State
+
+
+def check(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+    """Raise a `GaitshiftError` naming the first law that is broken, and where."""
+    _check_names(states, edges)
+    _check_ways_out(states, edges)
+    _check_reached(states, edges)
+    _check_one_at_a_time(edges)
+    _check_stances({state.name: state for state in states}, edges)
+
+
+def check_lockout(edges: tuple[Edge, ...], dwell: int, dwell_range: tuple[int, int]) -> None:
+    """Refuse dwells that a commanded one, in place of the machine's own, would take away.
+
+    A machine without any lock-out, in which all are 0, is lawful. Raises `GaitshiftError`.
+    """
+    if dwell > 0 and dwell_range[0] == 0:
+        raise GaitshiftError(
+            f"dwell_range must begin at 1 or above where dwell is {dwell}: a command of 0 would"
+            " end the lock-out"
+        )
+    for number, edge in enumerate(edges, start=1):
+        if dwell == 0 and edge.guard.dwell > 0:
+            raise GaitshiftError(
+                f"{_title(number, edge)}: a dwell of {edge.guard.dwell} would be lost, since the"
+                " machine's own is 0; give that 1 or above"
+            )
+
+
+def _check_names(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+    if not states:
+        raise GaitshiftError("there is no state; give at least one [[state]]")
+    names = tuple(state.name for state in states)
+    for number, name in enumerate(names, start=1):
+        if name in names[: number - 1]:
+            raise GaitshiftError(f"state {number}: the name {name!r} is taken already")
+    for number, edge in enumerate(edges, start=1):
+        for name in (edge.source, edge.target):
+            if name not in names:
+                raise GaitshiftError(f"{_title(number, edge)}: {known_names('state', name, names)}")
+
+
+def _check_ways_out(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+    if states[0].accepting:
+        raise GaitshiftError(f"state {states[0].name} is the first, so it cannot be accepting")
+    left = {edge.source: _title(number, edge) for number, edge in enumerate(edges, start=1)}
+    for state in states:
+        if state.accepting and state.name in left:
+            raise GaitshiftError(f"{left[state.name]}: no transition leaves an accepting state")
+        if not state.accepting and state.name not in left:
+            raise GaitshiftError(
+                f"state {state.name} has no way out; add a transition from it or accepting = true"
+            )
+
+
+def _check_reached(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+    reached = {states[0].name}
+    while new := {e.target for e in edges if e.source in reached} - reached:
+        reached |= new
+    if lost := [state.name for state in states if state.name not in reached]:
+        raise GaitshiftError(
+            f"state {lost[0]} is never reached from {states[0].name}, the first state"
+        )
+
+
+def _check_one_at_a_time(edges: tuple[Edge, ...]) -> None:
+    for (i, one), (j, other) in combinations(enumerate(edges, start=1), 2):
+        if one.source != other.source:
+            continue
+        feet = one.guard.pattern_shared_with(other.guard)
+        if feet is not None:
+            raise GaitshiftError(
+                f"{_title(i, one)} and {_title(j, other)} can hold at once,"
+                f" with {feet_text(feet)} down"
+            )
+
+
+def _check_stances(states: dict[str, State], edges: tuple[Edge, ...]) -> None:
+    shown = {
+        (edge.source, edge.target)
+        for edge in edges
+        if edge.guard.holds_in(states[edge.target].stance) or states[edge.target].accepting
+    }
+    for number, edge in enumerate(edges, start=1):
+        source, target = states[edge.source], states[edge.target]
+        if edge.guard.holds_in(source.stance):
+            raise GaitshiftError(
+                f"{_title(number, edge)}: the guard holds in the stance of {source.name} itself,"
+                f" {source.stance_text()}, which would be left without a step"
+            )
+        if (edge.source, edge.target) not in shown:
+            raise GaitshiftError(
+                f"{_title(number, edge)}: the guard does not hold in the stance of {target.name},"
+                f" {target.stance_text()}, which it leads to"
+            )
+
+
+def _title(number: int, edge: Edge) -> str:
+    return f"transition {number} ({edge.source} -> {edge.target})"

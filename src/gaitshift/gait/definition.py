@@ -1,0 +1,210 @@
+"""What a gait file says of a gait: states, edges, and its nominal commands."""
+
+import re
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from gaitshift.data import Table, located
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait.check import check, check_lockout
+from gaitshift.gait.cycle import cycle, shares, stride, touchdowns
+from gaitshift.gait.edge import Edge, check_swing_height
+from gaitshift.gait.guard import check_dwell
+from gaitshift.gait.mirror import mirrored_states
+from gaitshift.gait.state import State
+from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED
+from gaitshift.robot.legs import LEGS, MIRRORED_LEGS
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_KEYS = (
+    "name",
+    "title",
+    "description",
+    "dwell",
+    "dwell_range",
+    "speed",
+    "speed_range",
+    "swing_height",
+    "ideal_phase",
+    "state",
+    "transition",
+)
+
+
+_Own = TypeVar("_Own", bound="Definition")  # Self, but for checkers of types at run time
+
+
+@dataclass(frozen=True, kw_only=True)
+class Definition:
+    """A gait as data: <U, u0, F, δu, δr> (paper III-B) and what may be commanded.
+
+    The laws in `check.py` hold for every instance; breaking one raises `GaitshiftError`. States
+    count from 0 in the order of `states` (U and F together), and the first is u0.
+    """
+
+    name: str
+    """Short name in files and on the command line: letters, digits, "_" and "-"."""
+
+    title: str
+    """Name for people, such as "Half-bound"."""
+
+    description: str
+    """One or two sentences for people."""
+
+    states: tuple[State, ...]
+    """U and F."""
+
+    edges: tuple[Edge, ...]
+    """δu and δr."""
+
+    dwell: int
+    """The machine's own dwell [control steps], of every edge that names no other; 0 where no edge
+    has any."""
+
+    ideal_phase: tuple[float, float, float, float]
+    """Touchdown of each foot in `LEGS` [fraction of the stride, 0 to below 1]: the gait's norm."""
+
+    dwell_range: tuple[int, int]
+    """Least and greatest dwell that may be commanded [control steps]: the gait's frequencies. The
+    least is 0 where the machine's own is."""
+
+    speed: float
+    """Nominal forward speed [m/s], above 0."""
+
+    speed_range: tuple[float, float]
+    """Least and greatest forward speed that may be commanded [m/s]."""
+
+    def __post_init__(self):
+        if not _NAME.fullmatch(self.name):
+            raise GaitshiftError(
+                f"name {self.name!r} must be letters, digits, '_' and '-', a letter first"
+            )
+        check_dwell(self.dwell)
+        for leg, phase in zip(LEGS, self.ideal_phase, strict=True):
+            if not 0 <= phase < 1:
+                raise GaitshiftError(f"ideal_phase: {leg} must be 0 to below 1, not {phase:g}")
+        for name, own in (("dwell", self.dwell), ("speed", self.speed)):
+            low, high = getattr(self, f"{name}_range")
+            if not 0 <= low <= own <= high:
+                raise GaitshiftError(
+                    f"{name}_range must be two numbers, rising, with {name} = {own:g} in between,"
+                    f" not {low:g} to {high:g}"
+                )
+        if self.speed == 0:
+            raise GaitshiftError("speed must be above 0 m/s; its range may begin at 0")
+        if not self.speed_range[1] <= MOST_SPEED:
+            raise GaitshiftError(f"speed_range must end at {MOST_SPEED:g} m/s or below")
+        check_dwell(self.dwell_range[1])
+        check(self.states, self.edges)
+        check_lockout(self.edges, self.dwell, self.dwell_range)
+
+    @property
+    def initial(self) -> int:
+        """u0."""
+        return 0
+
+    @property
+    def accepting(self) -> tuple[int, ...]:
+        """F: the states in which a run ends; empty for a gait that goes on for ever."""
+        return tuple(u for u, state in enumerate(self.states) if state.accepting)
+
+    @property
+    def cycle(self) -> tuple[int, ...]:
+        """The edges from the first state back to it, as numbers in `edges`."""
+        return cycle(self.states, self.edges)
+
+    @property
+    def touchdowns(self) -> tuple[int, int, int, int]:
+        """How often each foot comes down on one cycle when every stance is shown exactly."""
+        return touchdowns(self.states, self.edges)
+
+    def stride(self, dwell: int | None = None) -> int:
+        """Least time of one cycle at a dwell, the machine's own if None [control steps]."""
+        return stride(self._shares, self.dwell if dwell is None else dwell)
+
+    def dwell_for(self, stride: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+        """The dwell in `dwell_range` whose cycle comes nearest to `stride` [control steps]."""
+        low, high = self.dwell_range
+        strides = self._stride_of_dwell[low : high + 1]
+        return low + np.abs(np.asarray(stride)[:, None] - strides).argmin(axis=1)
+
+    def mirrored(self: _Own) -> _Own:
+        """Return the machine of the robot seen in a mirror; feet in names of states change too."""
+        a, b, c, d = (self.ideal_phase[leg] for leg in MIRRORED_LEGS)
+        return replace(
+            self,
+            states=tuple(state.mirrored() for state in self.states),
+            edges=tuple(edge.mirrored() for edge in self.edges),
+            ideal_phase=(a, b, c, d),
+        )
+
+    def mirrored_states(self) -> tuple[int, ...] | None:
+        """State u seen in a mirror is state `result[u]` of this same machine.
+
+        None where the mirror shows another machine, as for a gait with a leading side.
+        """
+        return mirrored_states(self.states, self.edges)
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the machine as plain data in the shape of a gait file, ready for JSON."""
+        return {
+            "name": self.name,
+            "title": self.title,
+            "description": self.description,
+            "dwell": self.dwell,
+            "dwell_range": list(self.dwell_range),
+            "speed": self.speed,
+            "speed_range": list(self.speed_range),
+            "ideal_phase": dict(zip(LEGS, self.ideal_phase, strict=True)),
+            "state": [state.to_dict() for state in self.states],
+            "transition": [edge.to_dict() for edge in self.edges],
+        }
+
+    @classmethod
+    def from_dict(cls: type[_Own], data: object) -> _Own:
+        """Build the machine that `to_dict` or a gait file describes, checked in full.
+
+        Raises `GaitshiftError` with one line that names the table and the key.
+        """
+        table = Table(data, keys=_KEYS)
+        dwell = table.whole("dwell")
+        check_dwell(dwell)
+        swing_height = table.number("swing_height", default=0.0)
+        check_swing_height(swing_height)
+        speed = table.number("speed", default=PAPER_SPEED)
+        dwell_range = table.pair("dwell_range", default=(dwell, dwell))
+        if not all(end.is_integer() for end in dwell_range):
+            raise GaitshiftError("dwell_range must be two whole numbers of control steps")
+        with located("ideal_phase"):
+            phases = Table(table.get("ideal_phase"), keys=LEGS)
+            fl, fr, bl, br = (phases.number(leg) for leg in LEGS)
+        return cls(
+            name=table.text("name"),
+            title=table.text("title"),
+            description=table.text("description"),
+            states=tuple(
+                State.from_dict(one, number=number)
+                for number, one in enumerate(table.tables("state"), start=1)
+            ),
+            edges=tuple(
+                Edge.from_dict(one, number=number, dwell=dwell, swing_height=swing_height)
+                for number, one in enumerate(table.tables("transition"), start=1)
+            ),
+            dwell=dwell,
+            dwell_range=(int(dwell_range[0]), int(dwell_range[1])),
+            speed=speed,
+            speed_range=table.pair("speed_range", default=(speed, speed)),
+            ideal_phase=(fl, fr, bl, br),
+        )
+
+    @cached_property
+    def _shares(self) -> tuple[float, ...]:
+        return shares(self.states, self.edges, self.dwell)
+
+    @cached_property
+    def _stride_of_dwell(self) -> Int[np.ndarray, " D"]:
+        return np.array([stride(self._shares, dwell) for dwell in range(self.dwell_range[1] + 1)])

@@ -1,0 +1,174 @@
+"""The reward machine <U, u0, F, δu, δr> of a gait (paper III-B, III-C), for N robots at once."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.gait.definition import Definition
+from gaitshift.gait.lookup import Lookup
+from gaitshift.robot.legs import LABEL_COUNT, label_of
+
+GRACE = 2
+"""Control steps by which a change may be late and still be on time: ours, contacts take as long."""
+
+LATEST = 0.5
+"""A change later than that by this share of the dwell earns no bonus; ours."""
+
+
+class Step(NamedTuple):
+    """What one step did to N machines."""
+
+    state: Int[np.ndarray, " N"]
+    """u', the state each machine is in now."""
+
+    changed: Bool[np.ndarray, " N"]
+    """Whether it came there by an edge in this step."""
+
+    edge: Int[np.ndarray, " N"]
+    """Number of that edge in `edges`, the number of all edges where there was none."""
+
+    bonus: Float[np.ndarray, " N"]
+    """Multiplier of the shared bonus: δr of the edge where changed, 0 elsewhere."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardMachine(Definition):
+    """A gait as a machine whose states are stance sets and whose edges are steps of the feet.
+
+    Where no guard holds the machine stays where it is.
+    """
+
+    def step(
+        self,
+        state: Int[np.ndarray, " N"],
+        contact: Bool[np.ndarray, "N 4"],
+        steps_in_state: Int[np.ndarray, " N"],
+        *,
+        dwell: int | Int[np.ndarray, " N"] | None = None,
+    ) -> Step:
+        """δu and δr of N machines on the labels of this control step; nothing given is changed.
+
+        Args:
+            state: u, in which the policy acted.
+            contact: whether each foot touches at the end of the step, the label L(s, a, s').
+            steps_in_state: δ that the policy saw, the steps since the last change: 0 in the step
+                that follows a change, and the step now ending counts. So an edge opens when
+                steps_in_state + 1 reaches its dwell, and two changes are at least a dwell apart.
+            dwell: a gait-frequency command [control steps], in place of the machine's own dwell;
+                an edge that names its own keeps its proportion to it, rounded up.
+        """
+        rows = self._lookup
+        suiting = rows.edge[state * LABEL_COUNT + label_of(contact)]
+        waited = steps_in_state + 1
+        if dwell is None:
+            waited_enough = waited >= rows.dwell[suiting]
+        else:
+            waited_enough = waited * rows.dwell_parts >= rows.dwell_share[suiting] * dwell
+        edge = np.where(waited_enough, suiting, len(self.edges))
+        changed = edge < len(self.edges)
+        return Step(
+            state=np.where(changed, rows.target[edge], state),
+            changed=changed,
+            edge=edge,
+            bonus=rows.bonus[edge],
+        )
+
+    def swing_share(
+        self, edge: Int[np.ndarray, " N"], swing: Float[np.ndarray, "N 4"]
+    ) -> Float[np.ndarray, " N"]:
+        """How much of an edge's swing height its feet have reached, in [0, 1]: the lowest counts.
+
+        Args:
+            edge: as `step` gives it; 1 where there was none.
+            swing: greatest clearance [m] of each foot since the machine lifted it.
+        """
+        rows = self._lookup
+        height = rows.swing_height[edge]
+        share = np.clip(swing / np.where(height > 0, height, 1.0)[:, None], 0.0, 1.0)
+        return np.where(rows.landing[edge], share, 1.0).min(axis=1)
+
+    def lifted(
+        self, left: Int[np.ndarray, " N"], entered: Int[np.ndarray, " N"]
+    ) -> Bool[np.ndarray, "N 4"]:
+        """Feet that stand in the stance of the state left and not in that of the state entered."""
+        stance = self._lookup.down
+        return stance[left] & ~stance[entered]
+
+    def expected(self, state: Int[np.ndarray, " N"]) -> Bool[np.ndarray, "N 4"]:
+        """Feet whose touchdown is in place: those in the stance of the state or of the next one."""
+        return self._lookup.expected[state]
+
+    def wait(
+        self,
+        state: Int[np.ndarray, " N"],
+        steps_in_state: Int[np.ndarray, " N"],
+        dwell: int | Int[np.ndarray, " N"] | None = None,
+    ) -> Float[np.ndarray, " N"]:
+        """Control steps until the first edge out of the state may open; 0 once it may.
+
+        Arguments are as in `step`. With the state it tells the policy what the lock-out is about:
+        the stance is to be held now, or to be changed.
+        """
+        return np.maximum(self._least_steps(state, dwell) - steps_in_state - 1, 0.0)
+
+    def punctuality(
+        self,
+        state: Int[np.ndarray, " N"],
+        steps_in_state: Int[np.ndarray, " N"],
+        dwell: int | Int[np.ndarray, " N"] | None = None,
+    ) -> Float[np.ndarray, " N"]:
+        """How much of its bonus a change in this step still earns, in [0, 1]. Ours.
+
+        1 until `GRACE` steps after the first edge out of the state may open, 0 when it is later
+        than that by `LATEST` of the dwell, and a straight line in between; 1 where no dwell is
+        asked for, and in a machine that accepts: a task has no stride. The lock-out forbids a
+        stride above the commanded frequency; this prices one below it, and one whose halves
+        differ. Arguments are as in `step`.
+        """
+        if self.accepting:
+            return np.ones(len(state))
+        wanted = self._least_steps(state, dwell)
+        late = np.maximum(steps_in_state + 1 - wanted - GRACE, 0.0)
+        share = np.maximum(1.0 - late / (LATEST * np.maximum(wanted, 1.0)), 0.0)
+        return np.where(wanted > 0, share, 1.0)
+
+    def _least_steps(
+        self, state: Int[np.ndarray, " N"], dwell: int | Int[np.ndarray, " N"] | None
+    ) -> Float[np.ndarray, " N"]:
+        """Steps after which the first edge out of the state may open."""
+        asked = self.dwell if dwell is None else dwell
+        return np.ceil(self._lookup.least_share[state] * asked - 1e-9)
+
+    def enter(self, contact: Bool[np.ndarray, "N 4"]) -> Int[np.ndarray, " N"]:
+        """Return the state to start in: the stance that agrees with the contacts on most feet.
+
+        Used at the start of an episode and after a switch of gaits, on which the paper is silent.
+        Ties go to the lowest state; an accepting state is never entered.
+        """
+        return self._lookup.fitting_state[label_of(contact)]
+
+    def shows_stance(self, contact: Bool[np.ndarray, "N 4"]) -> Bool[np.ndarray, " N"]:
+        """Whether the contacts are the stance of any state."""
+        return self._lookup.is_stance[label_of(contact)]
+
+    def shows_state(
+        self, state: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Whether the contacts are the stance of the present state."""
+        return label_of(contact) == self._lookup.stance[state]
+
+    def agreement(
+        self, state: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
+    ) -> Float[np.ndarray, " N"]:
+        """Share of the feet that are, down or up, as the stance of the present state has them.
+
+        1 exactly where `shows_state` holds; 0 for an accepting state, which has no stance.
+        """
+        return self._lookup.agreement[state * LABEL_COUNT + label_of(contact)]
+
+    @cached_property
+    def _lookup(self) -> Lookup:
+        return Lookup.of(self.states, self.edges, dwell=self.dwell)

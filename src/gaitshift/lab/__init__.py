@@ -1,0 +1,1 @@
+"""Evidence: logs, rollouts, gait figures, trials, identification, studies, benchmarks."""

@@ -1,0 +1,117 @@
+"""Steps a second: the environment against bare physics in the same run, and training on top."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+from mujoco.batch import Batch
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import gaits
+from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.sim.env import GaitEnv
+from gaitshift.sim.terrain import from_spec
+
+ROUNDS = 7
+"""Rounds in which both are measured in turn; medians over them are quoted."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpeedConfig:
+    """What the speed is measured on."""
+
+    robots: int = 128
+    """Robots in parallel."""
+    steps: int = 100
+    """Control steps a round."""
+    terrain: str = "flat"
+    """Ground, as in `evaluate`."""
+    seed: int = 0
+    """Seed of the actions."""
+
+    def __post_init__(self) -> None:
+        if not (1 <= self.robots <= 65536 and 1 <= self.steps <= 100_000):
+            raise GaitshiftError("bench: robots from 1 to 65536 and steps from 1 to 100000, please")
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+
+
+def environment_speed(
+    config: SpeedConfig, report: Callable[[int, int], None] = lambda done, total: None
+) -> dict[str, float]:
+    """Control steps of a robot a second [1/s], and their ratio.
+
+    Environment and bare physics make the same motion: the robots step through the same small random
+    actions.
+    """
+    ground = from_spec(config.terrain, seed=config.seed, length=20.0, width=20.0)
+    env = GaitEnv(gaits.load("trot"), ground, config.robots)
+    env.reset(seed=config.seed)
+    rng = np.random.default_rng(config.seed)
+    actions = rng.normal(scale=0.5, size=(config.steps, config.robots, 12))
+    bare = _Bare(env, actions)
+    seconds: dict[str, list[float]] = {"env": [], "bare": []}
+    for index in range(ROUNDS):
+        seconds["env"].append(_time(lambda: [env.step(action) for action in actions]))
+        seconds["bare"].append(_time(bare.run))
+        report(index + 1, ROUNDS + 1)
+    total = config.robots * config.steps
+    env_rate, bare_rate = (total / median(seconds[name]) for name in ("env", "bare"))
+    ratios = [b / e for e, b in zip(seconds["env"], seconds["bare"], strict=True)]
+    return {
+        "bare_steps_per_s": bare_rate,
+        "env_steps_per_s": env_rate,
+        "env_over_bare": median(ratios),
+    }
+
+
+def training_speed(seed: int) -> dict[str, float]:
+    """Control steps of a robot a second of training [1/s], and what the flat stage then takes.
+
+    Raises:
+        ImportError: torch or rsl_rl is not installed.
+    """
+    import torch
+
+    from gaitshift.learn.learner import Learner
+    from gaitshift.learn.recipe import Recipe
+
+    recipe = Recipe()
+    torch.set_num_threads(recipe.threads)
+    ground = from_spec("flat", seed=0, length=20.0, width=20.0)
+    env = GaitEnv(gaits.load("trot"), ground, recipe.robots, config=recipe.env)
+    learner = Learner(env, recipe)
+    learner.start_episodes(seed)
+    learner.iterate()
+    per_iteration = median([_time(learner.iterate) for _ in range(ROUNDS)])
+    flat = recipe.stages[0].iterations
+    return {
+        "training_steps_per_s": recipe.robots * recipe.steps / per_iteration,
+        "flat_stage_iterations": float(flat),
+        "flat_stage_minutes": flat * per_iteration / 60,
+    }
+
+
+class _Bare:
+    """MuJoCo's own batch on the same model, driven to the same targets, and nothing else."""
+
+    def __init__(self, env: GaitEnv, actions: np.ndarray) -> None:
+        world = env.world
+        self._batch = Batch(world.model, env.num_envs)
+        self._batch.bind("qpos")[:], self._batch.bind("qvel")[:] = world.state()
+        self._ctrl = self._batch.bind("ctrl")
+        self._targets = env.robot.stance_angles + env.robot.action_scale * actions
+        self._substeps = round(CONTROL_PERIOD / world.model.opt.timestep)
+
+    def run(self) -> None:
+        for target in self._targets:
+            self._ctrl[:] = target
+            self._batch.step(nstep=self._substeps)
+
+
+def _time(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start

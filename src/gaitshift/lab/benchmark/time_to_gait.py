@@ -1,0 +1,210 @@
+"""Time to gait: how long training takes until a check is passed, beside a baseline's."""
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from math import inf
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol
+
+from gaitshift.control import policy
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine, gaits
+from gaitshift.lab.benchmark.check import Check
+from gaitshift.lab.benchmark.outcome import Outcome
+from gaitshift.learn.recipe import Recipe
+
+OURS, BASELINE = "gaitshift", "stable-baselines3"
+"""The learners, as outcomes name them."""
+
+
+def _flat_stage() -> Recipe:
+    recipe = Recipe()
+    return recipe.with_iterations(recipe.stages[0].iterations)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeToGait:
+    """What is trained, and when it is looked at."""
+
+    gaits: tuple[str, ...] = ("trot", "pace", "bound")
+    """The paper's three."""
+    seeds: int = 3
+    """Each gait is trained from this many seeds by each learner,"""
+    first_seed: int = 0
+    """of which this is the first."""
+    baseline_budget: float = 600.0
+    """Training time after which a baseline is given up [s]; 0: no baseline."""
+    recipe: Recipe = field(default_factory=_flat_stage)
+    """Ours: the flat stage of the default recipe, at whose end it is given up."""
+    check: Check = field(default_factory=Check)
+    """What ends a training."""
+    check_every: int = 10
+    """Iterations of ours between two checks; half a baseline's rollout at its defaults."""
+    baseline_rollout: int = 2048
+    """Control steps of each of the baseline's robots between two updates; it is checked after
+    each. stable-baselines3's default."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.seeds <= 100:
+            raise GaitshiftError(f"{self.seeds} seeds: 1 to 100 would be right")
+        if self.first_seed < 0:
+            raise GaitshiftError(f"first seed {self.first_seed}: a seed is 0 or larger")
+        if not self.gaits:
+            raise GaitshiftError("no gait: trot, or another one, would be right")
+        for name in self.gaits:
+            gaits.load(name)
+        if not 0 <= self.baseline_budget <= 86_400:
+            raise GaitshiftError(
+                f"baseline budget of {self.baseline_budget} s: 0 to 86400 s would be right"
+            )
+
+    @property
+    def trainings(self) -> int:
+        """How many outcomes there will be."""
+        return len(self.gaits) * self.seeds * (2 if self.baseline_budget > 0 else 1)
+
+    @classmethod
+    def quick(cls) -> "TimeToGait":
+        """Seconds of trot on few robots: shows that all of it works, not how fast it is."""
+        return cls(
+            gaits=("trot",),
+            seeds=1,
+            baseline_budget=1.0,
+            recipe=replace(Recipe().with_iterations(2), robots=8),
+            check=Check(robots=8, seconds=2.5),
+            check_every=1,
+            baseline_rollout=32,
+        )
+
+
+class Learner(Protocol):
+    """A training that goes on from check to check."""
+
+    @property
+    def steps(self) -> int:
+        """Control steps of all robots so far."""
+        ...
+
+    def advance(self) -> None:
+        """Trains up to the next check."""
+        ...
+
+    def export(self) -> Path:
+        """Writes the policy as it stands, and says where."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Entry:
+    """A learner in the race, and when it is given up."""
+
+    name: str
+    build: Callable[[RewardMachine, int, Path], Learner]
+    most_steps: float = inf
+    most_seconds: float = inf
+
+    def knows(self, known: Outcome, gait: str, seed: int) -> bool:
+        """Whether an outcome is this entry's, and no longer a training would tell more."""
+        if (known.learner, known.gait, known.seed) != (self.name, gait, seed):
+            return False
+        return known.reached or self.gives_up(known.steps, known.seconds)
+
+    def gives_up(self, steps: int, seconds: float) -> bool:
+        """Whether a training has come to its limit."""
+        return steps >= self.most_steps or seconds >= self.most_seconds
+
+
+def fingerprint(config: TimeToGait, learner: str, machine: RewardMachine) -> str:
+    """Of all that decides what a training does and when it has its gait, but its seed."""
+    told = {
+        "machine": machine.to_dict(),
+        "recipe": asdict(config.recipe),
+        "check": asdict(config.check),
+        "rollout": config.check_every if learner == OURS else config.baseline_rollout,
+    }
+    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def is_of(config: TimeToGait, outcome: Outcome) -> bool:
+    """Whether a measurement would train the same as an outcome tells of, from whatever seed."""
+    if outcome.gait not in config.gaits:
+        return False
+    return outcome.recipe == fingerprint(config, outcome.learner, gaits.load(outcome.gait))
+
+
+def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator[Outcome]:
+    """Trains every gait from every seed, ours and the baseline in turn; an outcome at a time.
+
+    Those that are `known` already are told as they are; of another recipe, they are not known.
+
+    Raises:
+        GaitshiftError: a package that training needs is not installed.
+    """
+    entries = _entries(config)
+    known = [outcome for outcome in known if is_of(config, outcome)]
+    for seed in range(config.first_seed, config.first_seed + config.seeds):
+        for gait in config.gaits:
+            for entry in entries:
+                told = (outcome for outcome in known if entry.knows(outcome, gait, seed))
+                yield next(told, None) or _train(entry, gaits.load(gait), seed, config)
+
+
+def _entries(config: TimeToGait) -> list[_Entry]:
+    recipe = config.recipe
+    try:
+        from gaitshift.lab.benchmark.ours import Ours
+
+        ours = _Entry(
+            name=OURS,
+            build=lambda machine, seed, folder: Ours(
+                machine, recipe, seed, folder, iterations=config.check_every
+            ),
+            most_steps=recipe.iterations * recipe.robots * recipe.steps,
+        )
+        if config.baseline_budget == 0:
+            return [ours]
+        from gaitshift.lab.benchmark.baseline import Baseline
+    except ImportError as error:
+        raise GaitshiftError(
+            f"time-to-gait needs the package '{error.name}'; install gaitshift[train] and, unless "
+            "--baseline-budget is 0, stable-baselines3"
+        ) from error
+    baseline = _Entry(
+        name=BASELINE,
+        build=lambda machine, seed, folder: Baseline(
+            machine, recipe, seed, folder, rollout=config.baseline_rollout
+        ),
+        most_seconds=config.baseline_budget,
+    )
+    return [ours, baseline]
+
+
+def _train(entry: _Entry, machine: RewardMachine, seed: int, config: TimeToGait) -> Outcome:
+    """Trains until a check is passed or the learner is given up; only training is timed."""
+    check = config.check
+    with TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        learner = entry.build(machine, seed, Path(folder))
+        seconds = time.perf_counter() - start
+        while True:
+            start = time.perf_counter()
+            learner.advance()
+            seconds += time.perf_counter() - start
+            loaded = policy.load(learner.export())
+            figures = check.see(loaded)
+            reached = check.is_passed(figures, loaded.info.forward_speed)
+            if reached or entry.gives_up(learner.steps, seconds):
+                return Outcome(
+                    gait=machine.name,
+                    learner=entry.name,
+                    seed=seed,
+                    reached=reached,
+                    seconds=seconds,
+                    steps=learner.steps,
+                    **asdict(figures),
+                    recipe=fingerprint(config, entry.name, machine),
+                )

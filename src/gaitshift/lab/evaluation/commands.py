@@ -1,0 +1,72 @@
+"""How well a policy does what it is asked for, over the whole range it was trained for."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gaitshift.control.policy import Policy
+from gaitshift.lab.evaluation.evaluate import EvaluationConfig, evaluate
+
+POINTS = 5
+"""Commands of a range that are tried, its ends among them."""
+
+ROBOTS, SECONDS = 16, 6.0
+"""Robots of each run and its length [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """What came of one pair of commands on flat ground; the first 2 s are left out."""
+
+    forward_speed: float
+    """Asked for [m/s]."""
+    stride_frequency: float
+    """Asked for [Hz]."""
+    speed_mean: float | None
+    """Measured [m/s]."""
+    cycles_per_s: float | None
+    """Measured [Hz]."""
+    pattern_fraction: float | None
+    """Share of the steps that show a stance of the gait."""
+    survival: float
+    """Share of the robots that never fall."""
+
+
+def follow_commands(
+    policy: Policy, seed: int = 0, report: Callable[[int, int], None] = lambda done, total: None
+) -> list[Followed]:
+    """Speeds over their range at the gait's own frequency, then frequencies at its own speed.
+
+    `report` is called with the runs done and the runs in all.
+    """
+    info = policy.info
+    own = (info.forward_speed, info.stride_frequency)
+    asked = [(speed, own[1]) for speed in _spread(info.speed_range)]
+    asked += [(own[0], frequency) for frequency in _spread(info.stride_frequency_range)]
+    rows: list[Followed] = []
+    for speed, frequency in asked:
+        rows.append(_follow(policy, speed, frequency, seed))
+        report(len(rows), len(asked))
+    return rows
+
+
+def _spread(ends: list[float]) -> list[float]:
+    return np.linspace(ends[0], ends[1], POINTS).tolist()
+
+
+def _follow(policy: Policy, speed: float, frequency: float, seed: int) -> Followed:
+    figures, _ = evaluate(
+        policy,
+        EvaluationConfig(
+            episodes=ROBOTS,
+            seconds=SECONDS,
+            speed=speed,
+            stride_frequency=frequency,
+            seed=seed,
+        ),
+    )
+    names = ("speed_mean", "cycles_per_s", "pattern_fraction", "survival")
+    measured: dict[str, Any] = {name: figures[name] for name in names}
+    return Followed(forward_speed=speed, stride_frequency=frequency, **measured)

@@ -1,0 +1,211 @@
+"""The demonstration: a robot that crosses a track and shifts its gait itself, or on a schedule."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+
+from gaitshift.control import Autonomous, Controller, Driver, Scheduled, Switcher
+from gaitshift.control.cpg import GAITS, CpgController
+from gaitshift.control.policy import Policy
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.lab.log import Log
+from gaitshift.shift import GaitGraph, load_condition
+from gaitshift.sim.terrain import Terrain, from_spec
+from gaitshift.sim.world import World
+
+RUN_OUT = 8.0
+"""Level metres behind the finish, for robots that wait there for the slower ones."""
+
+WIDTH = 8.0
+"""Width of a track [m]."""
+
+START = 1.5
+"""Where robots start along the track [m]."""
+
+
+_NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
+"""Numbers of a condition that a demonstration may change."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DemoConfig:
+    """What the demonstration shows."""
+
+    track: str = "flat@8,perlin:0.10@12,flat@10"
+    """The ground, piece by piece with lengths in metres; pieces as in `evaluate --terrain`."""
+    flat_gait: str = "trot"
+    """The gait on flat ground, and at the start."""
+    rough_gait: str = "bound"
+    """The gait on rough ground."""
+    condition: str = "touchdown_surprise"
+    """When to shift, by name: `touchdown_surprise`, which slopes and steps do not deceive;
+    `height_difference`, the paper's statistic with numbers of ours; `paper`, with its own."""
+    alpha: float | None = None
+    """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
+    beta: float | None = None
+    """β: shift to the rough gait when k exceeds it [counts]."""
+    leak: float | None = None
+    """What k loses in each step [counts]."""
+    alpha_back: float | None = None
+    """α': all below it counts as flat [m]."""
+    beta_back: float | None = None
+    """β': shift back when k exceeds it [counts]."""
+    hold: float | None = None
+    """Least time in either gait [s]."""
+    controller: Literal["policy", "cpg"] = "policy"
+    """What walks: trained policies, or coupled oscillators that learned nothing (trot, pace, bound,
+    walk), which go slowly and for low noise alone."""
+    graph: str = ""
+    """A gait graph in place of the two gaits and their condition: a shipped one by name, or a
+    TOML file."""
+    gaits: tuple[str, ...] = ()
+    """Gaits to show in a row instead, on a schedule and without the condition."""
+    every: float = 3.0
+    """Seconds from one of `gaits` to the next."""
+    at: tuple[float, ...] = ()
+    """Times of the shifts to the second of `gaits` and on [s], in place of `every`."""
+    episodes: int = 1
+    """Robots, each on a track and with a start of its own; pictures show the first."""
+    seed: int = 0
+    """Seed of the first track and start; the next robots have the next seeds."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.episodes <= 1000:
+            raise GaitshiftError(f"{self.episodes} episodes: 1 to 1000 would be right")
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+        if not 0.2 <= self.every <= 60:
+            raise GaitshiftError(f"a gait every {self.every} s: 0.2 to 60 s would be right")
+        given = [name for name in _NUMBERS if getattr(self, name) is not None]
+        if self.graph and given:
+            raise GaitshiftError(
+                f"a graph has its own numbers: change {given[0]} in its file, or leave --graph out"
+            )
+        if len(self.gaits) == 1:
+            raise GaitshiftError("one gait alone has nothing to shift to; give two or more")
+
+        if self.at and len(self.at) != len(self.gaits) - 1:
+            raise GaitshiftError(
+                f"{len(self.at)} times for {len(self.gaits)} gaits: {len(self.gaits) - 1} "
+                "would be right, one for each shift"
+            )
+        if any(late <= early for early, late in pairwise((0.0, *self.at))):
+            raise GaitshiftError("the times of the shifts must be positive and rising")
+
+    @property
+    def shift_times(self) -> tuple[float, ...]:
+        """When the shifts of a schedule are due [s]."""
+        return self.at or tuple(self.every * i for i in range(1, len(self.gaits)))
+
+    @property
+    def used(self) -> tuple[str, ...]:
+        """The gaits that appear, each once, the first first."""
+        return tuple(dict.fromkeys(self.gaits)) or self.ways.gaits
+
+    @property
+    def ways(self) -> GaitGraph:
+        """The gait graph that the robots shift by; `GaitshiftError` where it cannot be had."""
+        if self.graph:
+            return GaitGraph.load(self.graph)
+        condition = load_condition(self.condition, **{k: getattr(self, k) for k in _NUMBERS})
+        return GaitGraph.of(condition, flat=self.flat_gait, rough=self.rough_gait)
+
+
+def run_demo(
+    config: DemoConfig,
+    policies: Mapping[str, Policy],
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[Log, list[dict[str, Any]]]:
+    """Runs the demonstration: the log of all robots, and a summary for each."""
+    n = config.episodes
+    rng = np.random.default_rng(config.seed)
+    driver = _controller(config, policies)
+    switcher = _switcher(config)
+    grounds = [_ground(config, config.seed + i) for i in range(n)]
+    finish = _finish(config, grounds[0])
+    slowest = _slowest(config, policies)
+    run = RolloutConfig(seconds=_seconds(config, finish, slowest))
+    world = World(driver.robot, grounds, n, gains=driver.gains)
+    start = np.tile([START, 0.0], (n, 1))
+    log = rollout(
+        world,
+        driver,
+        run,
+        start_xy=start,
+        rng=rng,
+        switcher=switcher,
+        finish_x=finish,
+        report=report,
+    )
+    return log, [summarise(log, robot, finish) for robot in range(n)]
+
+
+def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
+    """What one robot did until it crossed `finish` [m] or the run ended.
+
+    Survival, distance, mean speed, and every shift of gait.
+    """
+    x = log.qpos[:, robot, 0]
+    crossed = np.flatnonzero(x >= finish)
+    end = int(crossed[0]) + 1 if crossed.size else len(x)
+    gait = log.gait[:end, robot]
+    shifts = np.flatnonzero(gait[1:] != gait[:-1]) + 1
+    fallen = bool(log.fallen[end - 1, robot])
+    return {
+        "survived": not fallen,
+        "finished": bool(crossed.size) and not fallen,
+        "time_s": round(float(log.time[end - 1]), 2),
+        "distance_m": round(float(x[end - 1] - x[0]), 3),
+        "mean_speed_m_s": round(float((x[end - 1] - x[0]) / log.time[end - 1]), 3),
+        "switches": [
+            {
+                "time_s": round(float(log.time[t]), 2),
+                "x_m": round(float(x[t]), 3),
+                "from": log.gaits[gait[t - 1]],
+                "to": log.gaits[gait[t]],
+                "k": float(log.k[t, robot]),
+            }
+            for t in shifts
+        ],
+    }
+
+
+def _controller(config: DemoConfig, policies: Mapping[str, Policy]) -> Controller:
+    used, n = config.used, config.episodes
+    if config.controller == "cpg":
+        return CpgController(used, n, start=used[0])
+    return Driver({gait: policies[gait] for gait in used}, n, start=used[0])
+
+
+def _slowest(config: DemoConfig, policies: Mapping[str, Policy]) -> float:
+    """Speed of the slowest gait that appears [m/s]."""
+    if config.controller == "cpg":
+        return min(GAITS[gait].speed for gait in config.used)
+    return min(policies[gait].info.forward_speed for gait in config.used)
+
+
+def _switcher(config: DemoConfig) -> Switcher:
+    if config.gaits:
+        return Scheduled(tuple(zip(config.shift_times, config.gaits[1:], strict=True)))
+    return Autonomous(config.ways, config.episodes)
+
+
+def _ground(config: DemoConfig, seed: int) -> Terrain:
+    if config.gaits:
+        return from_spec("flat", seed=seed, length=10.0, width=WIDTH)
+    return from_spec(f"{config.track},flat@{RUN_OUT}", seed=seed, length=1.0, width=WIDTH)
+
+
+def _finish(config: DemoConfig, ground: Terrain) -> float:
+    return np.inf if config.gaits else ground.extent[1] - RUN_OUT
+
+
+def _seconds(config: DemoConfig, finish: float, speed: float) -> float:
+    """Long enough for a robot at two thirds of the commanded speed [m/s]."""
+    if config.gaits:
+        return config.shift_times[-1] + config.every
+    return 1.5 * (finish - START) / speed

@@ -1,0 +1,243 @@
+"""The standard trials: what a shipped policy is put through, and the limits it is held against."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import ceil
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.control.policy import Policy
+from gaitshift.lab.evaluation.evaluate import (
+    FIELDS,
+    RUN_UP,
+    EvaluationConfig,
+    evaluate,
+    field_length,
+    run_policy,
+)
+from gaitshift.lab.gait_analysis import FIRST_GAITS, Check, checks
+from gaitshift.lab.log import Log
+
+BATCH = 1_000_000
+"""Most control steps of all robots of a batch: its log takes about 330 MB."""
+
+Report = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Size:
+    """How much the trials ask of the machine."""
+
+    pushed: int
+    """Episodes on flat ground with pushes."""
+    episodes: int
+    """Episodes of every other trial."""
+    seconds: float
+    """Length of an episode [s]."""
+    distance: float
+    """After which the lateral error is taken [m]."""
+
+
+SIZES = {
+    "all": Size(pushed=1000, episodes=256, seconds=20.0, distance=50.0),
+    "short": Size(pushed=256, episodes=64, seconds=20.0, distance=50.0),
+    "quick": Size(pushed=24, episodes=24, seconds=10.0, distance=5.0),
+}
+"""By their names on the command line; the quick ones are for a first look, and still long enough
+for robots to meet two steps or stairs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """A ground to survive or to keep the line on."""
+
+    figure: Literal["survival", "lateral_error_p95"]
+    """Share of robots that never fall in an episode, told with the share of the asked distance that
+    they came; or the distance from their line [m] that 95 % of all robots keep when they have gone
+    the distance, those that never arrive counted beyond."""
+    terrain: str
+    """Spec of the ground."""
+    piece: float | None = None
+    """Length of a piece that is laid out again and again [m]; None: one piece."""
+    push: float = 0.0
+    """Largest push on the base [N]."""
+    first: float | None = None
+    """Limit for trot, pace and bound; None: the figure is reported."""
+    others: float | None = None
+    """Limit for every other gait."""
+
+    def title(self, size: Size) -> str:
+        """One line for people, after the name of a figure."""
+        if self.figure == "lateral_error_p95":
+            return f"after {size.distance:g} m [m], {self.terrain}"
+        pushes = f", pushes up to {self.push:g} N" if self.push else ""
+        return f"of {size.seconds:g} s, {self.terrain}{pushes}"
+
+    def limit(self, gait: str) -> float | None:
+        """The limit of its figure for a gait."""
+        return self.first if gait in FIRST_GAITS else self.others
+
+    def spec(self, length: float) -> str:
+        """The ground at this length [m]: pieces in a row begin where robots have started level."""
+        if self.piece is None:
+            return self.terrain
+        pieces = [f"{self.terrain}@{self.piece:g}"] * ceil(length / self.piece)
+        return ",".join([f"flat@{RUN_UP + 1:g}", *pieces])
+
+
+TRIALS = (
+    Trial(figure="survival", terrain="flat", push=120.0, first=0.999, others=0.99),
+    Trial(figure="survival", terrain="perlin:0.10", first=0.995, others=0.97),
+    Trial(figure="survival", terrain="perlin:0.15", first=0.97),
+    Trial(figure="survival", terrain="perlin:0.20"),
+    Trial(figure="survival", terrain="perlin:0.25"),
+    Trial(figure="survival", terrain="slope:10", first=0.99),
+    Trial(figure="survival", terrain="slope:-10", first=0.99),
+    Trial(figure="survival", terrain="bank:10", first=0.99),
+    Trial(figure="survival", terrain="stairs:0.05", piece=9.0, first=0.97),
+    Trial(figure="survival", terrain="step:0.10", piece=6.0, first=0.97),
+    Trial(figure="lateral_error_p95", terrain="flat", first=0.5, others=1.0),
+    Trial(figure="lateral_error_p95", terrain="perlin:0.07", first=0.5, others=1.0),
+)
+"""Limits and grounds are ours. A piece of stairs goes ten steps up and down again."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One line of the table of trials."""
+
+    trial: str
+    """What was tried."""
+    value: float | None
+    """None: fewer robots than needed came to it."""
+    bound: Literal["at_least", "at_most"]
+    """Which side of the limit is right."""
+    limit: float | None
+    """None: the value is reported and held against nothing."""
+
+    @property
+    def passed(self) -> bool | None:
+        """Whether the limit is kept; None without a limit."""
+        if self.limit is None:
+            return None
+        if self.value is None:
+            return False
+        return self.value >= self.limit if self.bound == "at_least" else self.value <= self.limit
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {
+            "trial": self.trial,
+            "value": self.value,
+            self.bound: self.limit,
+            "passed": self.passed,
+        }
+
+
+def run_trials(
+    policy: Policy,
+    size: Size,
+    seed: int = 0,
+    report: Report = lambda done, total: None,
+) -> tuple[list[Row], dict[str, Any], Log]:
+    """All trials of a policy: the table, the figures of its gait on flat ground, and that run.
+
+    `report` is called with the control steps done, of all robots, and those in all.
+    """
+    gait = EvaluationConfig(episodes=size.episodes, seconds=size.seconds, seed=seed)
+    plan = [list(_batches(trial, policy, size, seed)) for trial in TRIALS]
+    total = sum(_cost(config) for config in (gait, *(c for configs in plan for c in configs)))
+    done = 0
+
+    def report_of(config: EvaluationConfig) -> Report:
+        nonlocal done
+        before, cost = done, _cost(config)
+        done += cost
+        return lambda now, all_: report(before + cost * now // all_, total)
+
+    rows: list[Row] = []
+    for trial, configs in zip(TRIALS, plan, strict=True):
+        outcomes = [
+            _outcomes(trial, policy, config, size.distance, report_of(config)) for config in configs
+        ]
+        for figure in outcomes[0]:
+            values = np.concatenate([outcome[figure] for outcome in outcomes])
+            rows.append(_row(trial, figure, size, policy.gait, values))
+    figures, log = evaluate(policy, gait, report_of(gait))
+    rows.extend(
+        Row(trial=_title_of(check), value=check.value, bound=check.bound, limit=check.limit)
+        for check in checks(figures, policy.machine)
+        if check.figure != "survival"  # that of the trials counts
+    )
+    return rows, figures, log
+
+
+def _batches(trial: Trial, policy: Policy, size: Size, seed: int) -> Iterator[EvaluationConfig]:
+    """The runs of a trial: each with a seed, and so with grounds, of its own."""
+    speed, seconds = policy.info.forward_speed, size.seconds
+    if trial.figure == "lateral_error_p95":
+        seconds = 2.0 + 1.5 * size.distance / speed  # for robots at two thirds of their speed
+    left = size.pushed if trial.push else size.episodes
+    most = max(1, int(BATCH / (100 * seconds) / FIELDS)) * FIELDS
+    while left > 0:
+        yield EvaluationConfig(
+            terrain=trial.spec(field_length(speed, seconds)),
+            episodes=min(left, most),
+            seconds=seconds,
+            push=trial.push,
+            seed=seed,
+        )
+        left, seed = left - most, seed + 1
+
+
+def _cost(config: EvaluationConfig) -> int:
+    return round(config.episodes * config.seconds * 100)
+
+
+def _outcomes(
+    trial: Trial, policy: Policy, config: EvaluationConfig, distance: float, report: Report
+) -> dict[str, Float[np.ndarray, " N"]]:
+    """What each robot came to, figure by figure."""
+    if trial.figure == "lateral_error_p95":
+        log = run_policy(policy, config, finish_x=distance, report=report)
+        return {"lateral_error_p95": lateral_errors(log, distance)}
+    log = run_policy(policy, config, report=report)
+    asked = policy.info.forward_speed * config.seconds
+    return {"survival": 1.0 - log.fallen[-1], "distance_share": distances(log) / asked}
+
+
+def distances(log: Log) -> Float[np.ndarray, " N"]:
+    """How far along x each robot came before it fell or time was up [m]."""
+    last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
+    x = log.qpos[..., 0].astype(float)
+    return np.take_along_axis(x, last[None], axis=0)[0] - x[0]
+
+
+def lateral_errors(log: Log, distance: float) -> Float[np.ndarray, " N"]:
+    """How far each robot is from its line when it has gone `distance` [m]; inf if it never has."""
+    there: Bool[np.ndarray, "T N"] = (log.qpos[..., 0] >= distance) & ~log.fallen
+    y = log.qpos[..., 1].astype(float)
+    first = there.argmax(axis=0)[None]
+    error = np.abs(np.take_along_axis(y, first, axis=0)[0] - y[0])
+    return np.where(there.any(axis=0), error, np.inf)
+
+
+def _title_of(check: Check) -> str:
+    unit = f" [{check.unit}]" if check.unit else ""
+    foot = f", worst foot {check.foot}" if check.foot else ""
+    return f"{check.figure}{unit}, flat{foot}"
+
+
+def _row(
+    trial: Trial, figure: str, size: Size, gait: str, outcomes: Float[np.ndarray, " N"]
+) -> Row:
+    title = f"{figure} {trial.title(size)}"
+    limit = trial.limit(gait) if figure == trial.figure else None
+    if figure != "lateral_error_p95":
+        return Row(trial=title, value=float(outcomes.mean()), bound="at_least", limit=limit)
+    # "higher" takes a robot's own error, where interpolation with inf would give no number.
+    value = float(np.quantile(outcomes, 0.95, method="higher"))
+    kept = value if np.isfinite(value) else None
+    return Row(trial=title, value=kept, bound="at_most", limit=limit)

@@ -1,0 +1,85 @@
+"""The part of a log that figures are taken from: after the warm-up, robots on their feet."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from gaitshift.gait import RewardMachine
+from gaitshift.lab.gait_analysis.steps import onsets, steady
+from gaitshift.lab.log import Log
+from gaitshift.robot.command import CONTROL_PERIOD
+
+WARM_UP = 2.0
+"""Seconds from the start that are left out of every figure but survival and lateral error."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sample:
+    """L control steps of N robots; after its fall a robot counts no more."""
+
+    log: Log
+    """The log from the end of the warm-up on."""
+    whole: Log
+    """The log with its warm-up: what happens at the first step shows against the one before."""
+
+    @classmethod
+    def of(cls, log: Log, warm_up: float = WARM_UP) -> "Sample":
+        """The sample of a whole log; empty where the log is no longer than the warm-up [s]."""
+        begin = int(np.searchsorted(log.time, warm_up, side="right"))
+        return cls(log=log.part(slice(begin, None)), whole=log)
+
+    @property
+    def period(self) -> float:
+        """Time of a control step [s]."""
+        time = self.log.time
+        return float(time[1] - time[0]) if len(time) > 1 else CONTROL_PERIOD
+
+    @cached_property
+    def alive(self) -> Bool[np.ndarray, "L N"]:
+        """Whether a robot is on its feet; from its fall on it is not."""
+        return ~self.log.fallen
+
+    @cached_property
+    def steps(self) -> int:
+        """Control steps of all robots on their feet together."""
+        return int(self.alive.sum())
+
+    @cached_property
+    def contact(self) -> Bool[np.ndarray, "L N 4"]:
+        """Feet that are down, of robots on their feet; as they were logged."""
+        return self.log.contact & self.alive[..., None]
+
+    @cached_property
+    def onsets(self) -> Bool[np.ndarray, "L N 4"]:
+        """Where a foot is down that was up in the step before: every contact, bounces too."""
+        return self._late(onsets(self.whole.contact)) & self.alive[..., None]
+
+    @cached_property
+    def touchdowns(self) -> Bool[np.ndarray, "L N 4"]:
+        """Where a foot ends a swing: onsets that are no bounce (`steps.steady`)."""
+        steps = onsets(steady(self.whole.contact, self.period))
+        return self._late(steps) & self.alive[..., None]
+
+    def entries(self, machines: Mapping[str, RewardMachine]) -> Bool[np.ndarray, "L N"]:
+        """Where a machine comes back into its first state: a cycle is full."""
+        log = self.whole
+        first = np.array([machines[gait].initial for gait in log.gaits])
+        in_first = log.machine_state == first[log.gait]
+        same_gait = log.gait[1:] == log.gait[:-1]
+        entry = np.zeros_like(in_first)
+        entry[1:] = in_first[1:] & ~in_first[:-1] & same_gait
+        return self._late(entry) & self.alive
+
+    def gait(self) -> str:
+        """The gait that was in force for most of the time."""
+        counts: Int[np.ndarray, " G"] = np.bincount(
+            self.log.gait.ravel(), minlength=len(self.log.gaits)
+        )
+        return self.log.gaits[int(counts.argmax())]
+
+    def _late(self, course: Bool[np.ndarray, "T *rest"]) -> Bool[np.ndarray, "L *rest"]:
+        """What of a course over the whole log falls into the sample."""
+        return course[len(self.whole.time) - len(self.log.time) :]

@@ -1,0 +1,102 @@
+"""The verdict on a gait: each of its figures against its limit."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from gaitshift.gait import RewardMachine
+from gaitshift.lab.gait_analysis.limits import Limits, limits_of
+from gaitshift.lab.gait_analysis.phase import phase_errors
+from gaitshift.robot.legs import LEGS, MIRRORED_LEGS
+
+_UNITS = {"speed_error": "m/s", "phase_error": "stride", "clearance": "m"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One figure against its limit."""
+
+    figure: str
+    """What is held against the limit: a field of `Limits`."""
+    foot: str | None = None
+    """The foot that comes off worst, where the limit is for each; by its name in `LEGS`."""
+    value: float | None
+    """None: nothing was there to measure, which passes no limit."""
+    bound: Literal["at_least", "at_most"]
+    """Which side of the limit is right."""
+    limit: float
+    """In the unit of the figure."""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the value keeps the limit."""
+        if self.value is None:
+            return False
+        return self.value >= self.limit if self.bound == "at_least" else self.value <= self.limit
+
+    @property
+    def unit(self) -> str:
+        """Of value and limit; empty where they are shares."""
+        return _UNITS.get(self.figure, "")
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        foot = {} if self.foot is None else {"foot": self.foot}
+        return {"figure": self.figure, **foot, "value": self.value, self.bound: self.limit}
+
+
+def checks(figures: Mapping[str, Any], machine: RewardMachine) -> tuple[Check, ...]:
+    """All limits of the machine's gait against the figures that `measure` gives.
+
+    Of limits on each foot the worst foot is shown. Duty factors are held against each other where
+    the gait is its own mirror image.
+    """
+    limits = limits_of(machine.name)
+    touchdowns = figures["touchdowns_per_cycle"]
+    touchdown_error = None if touchdowns is None else np.abs(np.array(touchdowns) - 1.0)
+    phase = np.array([np.nan if x is None else x for x in figures["phase"]])
+    result = [
+        _whole(limits, "survival", figures["survival"], "at_least"),
+        _whole(limits, "speed_error", figures["speed_error"], "at_most"),
+        _whole(limits, "pattern_fraction", figures["pattern_fraction"], "at_least"),
+        _worst(limits, "touchdown_error", touchdown_error, "at_most"),
+        _worst(limits, "phase_error", phase_errors(phase, machine), "at_most"),
+        _worst(limits, "phase_consistency", figures["phase_consistency"], "at_least"),
+        _worst(limits, "clearance", figures["clearance"], "at_least"),
+    ]
+    if machine.mirrored_states() is not None:
+        duty = figures["duty_factor"]
+        asymmetry = None if duty is None else _asymmetry(duty)
+        result.append(_worst(limits, "duty_asymmetry", asymmetry, "at_most"))
+    return tuple(result)
+
+
+def _asymmetry(duty: list[float]) -> np.ndarray:
+    return np.abs(np.array(duty) - np.array(duty)[list(MIRRORED_LEGS)])
+
+
+def _whole(
+    limits: Limits, figure: str, value: float | None, bound: Literal["at_least", "at_most"]
+) -> Check:
+    return Check(figure=figure, value=value, bound=bound, limit=getattr(limits, figure))
+
+
+def _worst(
+    limits: Limits, figure: str, values: Any, bound: Literal["at_least", "at_most"]
+) -> Check:
+    """Check of the foot whose value is worst; one without a value is worse than any."""
+    limit = getattr(limits, figure)
+    if values is None:
+        return Check(figure=figure, value=None, bound=bound, limit=limit)
+    each = np.array([np.nan if x is None else x for x in values], dtype=float)
+    missing = np.flatnonzero(np.isnan(each))
+    if missing.size:
+        return Check(
+            figure=figure, foot=LEGS[int(missing[0])], value=None, bound=bound, limit=limit
+        )
+    worst = int(each.argmin() if bound == "at_least" else each.argmax())
+    return Check(
+        figure=figure, foot=LEGS[worst], value=float(each[worst]), bound=bound, limit=limit
+    )

@@ -1,0 +1,116 @@
+"""The α, β and leak that a criterion chooses, and what other recordings say of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.tally import Grid, Tally
+
+HEADROOM = 1.25
+"""No false shift on the recordings of the choice even at a β smaller by this factor; ours: what is
+chosen at the very edge fails on the next recordings."""
+
+ALPHA_HEADROOM = 1.05
+"""… and at an α by this factor further to where a rule fires more: smaller where it counts what is
+above α, larger where it counts what is below. All the headroom there is where β is 0; ours."""
+
+MISS_COSTS = 20.0
+"""A rough stretch that went by without a shift counts as a delay of this many metres; ours."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """A point of the grid, and how it did on the recordings that chose it."""
+
+    alpha: float
+    """α, in the statistic's unit."""
+    beta: float
+    """β [counts]."""
+    leak: float
+    """What k loses in each step [counts]."""
+    cost_m: float = np.nan
+    """Mean delay with misses counted [m]: what was made small; NaN where the numbers were given."""
+    false_per_km: float = np.nan
+    """False shifts a kilometre of smooth ground at this α and β; NaN where they were given."""
+    is_free: bool | None = None
+    """Whether no robot shifted on smooth ground, with headroom in β; else the fewest were taken.
+    None where the numbers were given."""
+
+
+def choose(
+    tallies: Mapping[float, Mapping[str, Tally]],
+    grid: Grid,
+    when: Literal["above", "below"] = "above",
+) -> Choice:
+    """The soonest detection of rough ground among the settings that never shift on smooth ground.
+
+    Where there is none, those with the fewest false shifts a kilometre are taken.
+
+    Args:
+        tallies: by leak, then by the name of the recordings.
+        grid: the α and β that they are about.
+        when: what the rule counts; "below" is for the way back, on which rough and smooth ground
+            have changed their parts.
+
+    Raises:
+        GaitshiftError: no robot came to rough ground, or none walked on smooth ground.
+    """
+    choices = [_best(leak, _together(by_name), grid, when) for leak, by_name in tallies.items()]
+    return min(choices, key=lambda c: (not c.is_free, 0 if c.is_free else c.false_per_km, c.cost_m))
+
+
+def _best(leak: float, tally: Tally, grid: Grid, when: Literal["above", "below"]) -> Choice:
+    back = when == "below"
+    if not tally.came.any():
+        ground = "rough ground that ends" if back else "rough ground"
+        raise GaitshiftError(f"no {ground} in the recordings: nothing to detect")
+    if not tally.km.any():
+        ground = "rough" if back else "smooth"
+        raise GaitshiftError(f"no {ground} ground in the recordings: nothing to keep still on")
+    cost = _cost(tally)
+    free = _free(tally, grid, when)
+    rate = tally.false_per_km
+    allowed = free if free.any() else rate == np.nanmin(rate)
+    a, b = np.unravel_index(np.where(allowed, cost, np.inf).argmin(), grid.shape)
+    return Choice(
+        alpha=float(grid.alphas[a]),
+        beta=float(grid.betas[b]),
+        leak=leak,
+        cost_m=float(cost[a, b]),
+        false_per_km=float(tally.false_per_km[a, b]),
+        is_free=bool(free.any()),
+    )
+
+
+def _together(by_name: Mapping[str, Tally]) -> Tally:
+    tallies = list(by_name.values())
+    if not tallies:
+        raise GaitshiftError("no recordings to choose by")
+    whole = Tally(shape=tallies[0].shape)
+    for tally in tallies:
+        whole.join(tally)
+    return whole
+
+
+def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
+    """Mean delay [m] over all that came to rough ground, a miss counting `MISS_COSTS`."""
+    missed = tally.came - tally.detected
+    total = tally.metres + MISS_COSTS * missed
+    return np.where(tally.came > 0, total / np.maximum(tally.came, 1), np.inf)
+
+
+def _free(tally: Tally, grid: Grid, when: Literal["above", "below"]) -> np.ndarray:
+    """Where nobody fired on smooth ground, nor at a β that much smaller and an α as much nearer."""
+    clean = tally.fired == 0
+    if when == "above":
+        alpha = np.searchsorted(grid.alphas, grid.alphas / ALPHA_HEADROOM, "right") - 1
+    else:
+        alpha = np.searchsorted(grid.alphas, grid.alphas * ALPHA_HEADROOM, "left")
+    beta = np.searchsorted(grid.betas, grid.betas / HEADROOM, "right") - 1
+    last = len(grid.alphas) - 1
+    known = ((alpha >= 0) & (alpha <= last))[:, None] & (beta >= 0)
+    return clean & known & clean[np.clip(alpha, 0, last)][:, np.maximum(beta, 0)]

@@ -1,0 +1,160 @@
+"""An upper bound: gradient boosting on windows of the same signals that conditions are fed with."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+from zlib import crc32
+
+import numpy as np
+from jaxtyping import Bool, Float
+from sklearn.ensemble import HistGradientBoostingClassifier
+from threadpoolctl import threadpool_limits
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.candidates import Candidate
+from gaitshift.lab.identification.recording import Recording
+from gaitshift.shift import (
+    AnyStatistic,
+    AttitudeVariance,
+    ContactTiming,
+    CostOfTransport,
+    HeightDifference,
+    PlaneResidual,
+    Slip,
+    TouchdownSurprise,
+)
+
+NAME = "classifier"
+
+_STATISTICS: tuple[AnyStatistic, ...] = (
+    HeightDifference(),
+    PlaneResidual(touches=2),
+    PlaneResidual(touches=4),
+    TouchdownSurprise(memory=1),
+    TouchdownSurprise(),
+    TouchdownSurprise(memory=12),
+    AttitudeVariance(window=0.3),
+    AttitudeVariance(window=1.0),
+    ContactTiming(),
+    Slip(),
+    CostOfTransport(window=0.5),
+)
+"""What it sees of a step: the largest number of each, now and over windows."""
+
+_WINDOWS = (0.5, 2.0)
+"""Means over the last so many seconds are seen as well."""
+
+_EVERY = 5
+"""It looks at each fifth step, and says the same in between."""
+
+_SEED = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RoughnessClassifier:
+    """Two models, of half of the robots each: one of them has never seen a robot."""
+
+    statistics: tuple[AnyStatistic, ...]
+    """Those that the recordings feed."""
+    models: tuple[Any, Any]
+    """Of one half of the robots, and of the other."""
+    halves: Mapping[int, int]
+    """Which of them learned from the first robot of each recording; they take turns from there."""
+
+    @classmethod
+    def fit(cls, recordings: Iterable[Recording]) -> "RoughnessClassifier":
+        """Learns rough from smooth ground.
+
+        Raises:
+            GaitshiftError: the labels are of one kind alone.
+        """
+        features: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+        labels: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
+        statistics: tuple[AnyStatistic, ...] = ()
+        halves: dict[int, int] = {}
+        count = 0
+        for recording in recordings:
+            statistics = statistics or _fed_by(recording)
+            seen = _features(recording, statistics)
+            rough, alive = recording.rough[::_EVERY], recording.alive[::_EVERY]
+            halves[_key(recording)] = count % 2
+            for robot in range(recording.robots):
+                half, kept = count % 2, alive[:, robot]
+                count += 1
+                features[half].append(seen[kept, robot])
+                labels[half].append(rough[kept, robot])
+        if not (features[0] and features[1]):
+            raise GaitshiftError("a classifier needs two robots, or several passages of one")
+        models = tuple(
+            _fitted(np.concatenate(x), np.concatenate(y))
+            for x, y in zip(features, labels, strict=True)
+        )
+        return cls(statistics=statistics, models=cast(Any, models), halves=halves)
+
+    def probability(self, recording: Recording, *, crosswise: bool) -> Float[np.ndarray, "T N 1"]:
+        """How likely the ground is rough, by both models, or by the one that never saw the robot.
+
+        `crosswise` is for the very recordings that it was fitted on.
+        """
+        seen = _features(recording, self.statistics)
+        steps, robots, width = seen.shape
+        flat = seen.reshape(steps * robots, width)
+        with threadpool_limits(1):  # batches are small: threads would only wait for each other
+            first, second = (_likely(model, flat).reshape(steps, robots) for model in self.models)
+        likely = (first + second) / 2
+        if crosswise:
+            half = cast(Any, (self.halves[_key(recording)] + np.arange(robots)) % 2)
+            likely = np.where(half == 0, second, first)
+        return np.repeat(likely, _EVERY, axis=0)[: len(recording.time), :, None]
+
+    def candidate(self, *, crosswise: bool) -> Candidate:
+        """As a condition whose α is a probability."""
+        return Candidate(
+            name=NAME,
+            low=0.02,
+            high=0.999,
+            note="gradient boosting on all of these signals: an upper bound",
+            values=lambda recording: self.probability(recording, crosswise=crosswise),
+        )
+
+
+def _fed_by(recording: Recording) -> tuple[AnyStatistic, ...]:
+    return tuple(
+        s for s in _STATISTICS if all(getattr(recording, name) is not None for name in s.needs)
+    )
+
+
+def _key(recording: Recording) -> int:
+    return crc32(recording.foot_position_b.tobytes())
+
+
+def _features(
+    recording: Recording, statistics: tuple[AnyStatistic, ...]
+) -> Float[np.ndarray, "S N F"]:
+    """What the classifier sees, at each fifth step; NaN where nothing is known yet."""
+    columns: list[np.ndarray] = []
+    for statistic in statistics:
+        values = recording.values(statistic)
+        known = ~np.isnan(values)
+        now = np.where(known.any(axis=2), np.where(known, values, -np.inf).max(axis=2), np.nan)
+        columns.append(now[::_EVERY])
+        total = np.nan_to_num(now).cumsum(axis=0)
+        for seconds in _WINDOWS:
+            back = max(1, round(seconds / recording.period))
+            before = np.concatenate([np.zeros((back, recording.robots)), total])[: len(total)]
+            columns.append(((total - before) / back)[::_EVERY])
+    return np.stack(columns, axis=2).astype(np.float32)
+
+
+def _fitted(x: Float[np.ndarray, "K F"], y: Bool[np.ndarray, " K"]) -> Any:
+    if y.all() or not y.any():
+        kind = "rough" if y.all() else "smooth"
+        raise GaitshiftError(f"all labels are {kind}: a classifier needs rough and smooth ground")
+    model: Any = HistGradientBoostingClassifier(random_state=_SEED, class_weight="balanced")
+    with threadpool_limits(1):
+        model.fit(x, y)
+    return model
+
+
+def _likely(model: Any, x: Float[np.ndarray, "K F"]) -> Float[np.ndarray, " K"]:
+    return np.asarray(model.predict_proba(x))[:, 1]

@@ -1,0 +1,177 @@
+"""What conditions with their numbers do on recordings that did not choose them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.chatter import Said, chattered, ever_fires, in_turn, shifts
+from gaitshift.lab.identification.facing import facing
+from gaitshift.lab.identification.grid import first_firings, steps_alive
+from gaitshift.lab.identification.passage import longest_passage, passage_scores
+from gaitshift.lab.identification.recording import Recording
+from gaitshift.lab.identification.scores import detections
+from gaitshift.lab.identification.statistics import auc, auc_interval
+from gaitshift.lab.identification.tally import Tally, join_by_name
+from gaitshift.lab.identification.tuning import Tuned
+
+
+@dataclass(kw_only=True)
+class OnCourse:
+    """How one condition did on the recordings of one name."""
+
+    course: str
+    """Name of the recordings."""
+    tally: Tally
+    """Of one α and one β."""
+    delays_m: list[float] = field(default_factory=list)
+    """Of each detection [m]."""
+    scores: dict[bool, list[int]] = field(default_factory=lambda: {True: [], False: []})
+    """Score of each passage (`passage_scores`), of what is to be noticed and of what is not."""
+    shifts: int = 0
+    """How often robots would have shifted, there and back (`chatter`)."""
+    chattered: int = 0
+    """Robots that did so more than once there and once back for each rough stretch."""
+
+    def join(self, other: "OnCourse") -> None:
+        """Takes in all that another one has."""
+        self.tally.join(other.tally)
+        self.delays_m += other.delays_m
+        for is_wanted, scores in other.scores.items():
+            self.scores[is_wanted] += scores
+        self.shifts += other.shifts
+        self.chattered += other.chattered
+
+
+@dataclass(kw_only=True)
+class Replayed:
+    """What conditions with their numbers did on some recordings; that of others may join it."""
+
+    courses: dict[str, dict[str, OnCourse]] = field(default_factory=dict)
+    """By condition, by the name of the recordings."""
+    soonest: dict[str, float] = field(default_factory=dict)
+    """What each one's β is in time [s]."""
+    scored: dict[str, bool] = field(default_factory=dict)
+    """Whether a passage was long enough for each one's k to exceed `Tuned.area_beta`."""
+    metres: float = 0.0
+    """Way that all robots have come [m],"""
+    seconds: float = 0.0
+    """and the time that it took them [s]."""
+
+    def join(self, other: "Replayed") -> None:
+        """Takes in all that another one has."""
+        for name, by_course in other.courses.items():
+            join_by_name(self.courses.setdefault(name, {}), by_course)
+        self.soonest |= other.soonest
+        for name, scored in other.scored.items():
+            self.scored[name] = self.scored.get(name, False) or scored
+        self.metres += other.metres
+        self.seconds += other.seconds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """A condition on recordings that did not choose its numbers."""
+
+    tuned: Tuned
+    """The condition."""
+    courses: tuple[OnCourse, ...]
+    """Course by course."""
+    soonest: float
+    """What β is in time [s]: from k = 0 to firing where every value counts in each step."""
+    speed: float
+    """Mean speed of the robots that judged [m/s]."""
+    is_scored: bool
+    """Whether k can exceed `Tuned.area_beta` within a passage: else its scores tell nothing."""
+
+    def area(self, course: str) -> tuple[float, float, float] | None:
+        """Area under the ROC curve of the passages to be noticed on a course, with its interval.
+
+        Against the passages of all recordings on which nothing is to be noticed; None without both,
+        and where no passage is long enough for the rule to fire at all.
+        """
+        wanted, others = self.scores_on(course), self.other_scores
+        if not self.is_scored or not wanted.size or not others.size:
+            return None
+        area = float(auc(wanted[:, None], others[:, None])[0])
+        low, high = auc_interval(area, len(wanted), len(others))
+        return area, low, high
+
+    def scores_on(self, course: str) -> Float[np.ndarray, " P"]:
+        """Scores of the passages to be noticed on a course."""
+        of = [c.scores[True] for c in self.courses if c.course == course]
+        return np.array([float(score) for scores in of for score in scores])
+
+    @property
+    def other_scores(self) -> Float[np.ndarray, " Q"]:
+        """Scores of the passages in which nothing is to be noticed."""
+        return np.array([float(x) for course in self.courses for x in course.scores[False]])
+
+
+def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[Recording]) -> Replayed:
+    """Replays each condition with its numbers, course by course.
+
+    Raises:
+        GaitshiftError: a recording lacks the signals of a condition.
+    """
+    replayed = Replayed(courses={one.candidate.name: {} for one in tuned})
+    for recording in recordings:
+        steps = steps_alive(recording.alive)
+        replayed.metres += float(recording.distance[steps - 1, np.arange(recording.robots)].sum())
+        replayed.seconds += float(steps.sum()) * recording.period
+        for one in tuned:
+            name, rule = one.candidate.name, one.rule
+            if missing := one.candidate.missing(recording):
+                raise GaitshiftError(
+                    f"{recording.name} lacks signals of '{name}': it needs {', '.join(missing)}"
+                )
+            values = one.candidate.values(recording)
+            seen, faced = facing(recording, values, one.way)
+            course = replayed.courses[name].setdefault(
+                seen.name, OnCourse(course=seen.name, tally=Tally(shape=(1, 1)))
+            )
+            _add(course, one, seen, faced)
+            if one.way == "flat" or ever_fires(recording, rule, values):
+                watched = one.candidate.statistic or Said(values=values)
+                count = shifts(recording, in_turn(rule, watched, one.way))
+                course.shifts += int(count.sum())
+                course.chattered += int(chattered(recording, count).sum())
+            width, period = values.shape[2], recording.period
+            replayed.soonest[name] = rule.soonest(width, period)
+            least = one.area_rule.soonest(width, period)
+            enough = least < period * (longest_passage(seen) + 0.5)
+            replayed.scored[name] = replayed.scored.get(name, False) or enough
+    return replayed
+
+
+def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
+    """Each condition with what came of it.
+
+    Raises:
+        GaitshiftError: there was no recording.
+    """
+    if not replayed.seconds:
+        raise GaitshiftError("no recordings to judge by")
+    return [
+        Judged(
+            tuned=one,
+            courses=tuple(replayed.courses[one.candidate.name].values()),
+            soonest=replayed.soonest[one.candidate.name],
+            speed=replayed.metres / replayed.seconds,
+            is_scored=replayed.scored[one.candidate.name],
+        )
+        for one in tuned
+    ]
+
+
+def _add(course: OnCourse, one: Tuned, seen: Recording, values: Float[np.ndarray, "T N M"]) -> None:
+    """Takes in how a condition did on a recording that shows what it is to notice (`facing`)."""
+    alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
+    first = first_firings(values, seen.alive, one.rule, alpha, beta)
+    course.tally.add(seen, first)
+    delays = detections(seen, first).delay_m.ravel()
+    course.delays_m += delays[~np.isnan(delays)].tolist()
+    for is_wanted, of in passage_scores(seen, values, one.area_rule, one.grid.alphas).items():
+        course.scores[is_wanted] += of

@@ -1,0 +1,264 @@
+"""The report of an identification: README.md and two small tables."""
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gaitshift.lab.identification.chatter import SHIPPED, shipped_rule
+from gaitshift.lab.identification.choice import Choice
+from gaitshift.lab.identification.judging import Judged, OnCourse
+from gaitshift.lab.identification.passage import LENGTH
+from gaitshift.lab.identification.statistics import poisson, wilson
+from gaitshift.robot.command import CONTROL_PERIOD
+
+README, CONDITIONS, COURSES = FILES = ("README.md", "conditions.csv", "courses.csv")
+
+Row = dict[str, Any]
+
+_TITLES = {"rough": "When rough ground begins", "flat": "When rough ground ends"}
+
+
+def condition_rows(judged: Sequence[Judged]) -> list[Row]:
+    """One row a condition: its numbers, and all courses together."""
+    return [_condition_row(one) for one in judged]
+
+
+def course_rows(judged: Sequence[Judged]) -> list[Row]:
+    """One row a condition and course."""
+    return [_course_row(one, course) for one in judged for course in one.courses]
+
+
+def write_report(
+    judged: Sequence[Judged],
+    out: Path,
+    *,
+    command: str,
+    held_out: bool,
+    pictures: Mapping[str, str],
+) -> list[Row]:
+    """Writes it into `out`; gives the rows of the conditions.
+
+    Args:
+        judged: the conditions.
+        out: a folder that exists.
+        command: what made it.
+        held_out: whether other logs judged than those that chose.
+        pictures: files in the folder, and a line on each.
+    """
+    conditions, courses = condition_rows(judged), course_rows(judged)
+    for name, rows in ((CONDITIONS, conditions), (COURSES, courses)):
+        with (out / name).open("w", newline="") as file:
+            lines = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+            lines.writeheader()
+            lines.writerows(rows)
+    (out / README).write_text(_readme(judged, conditions, courses, command, held_out, pictures))
+    return conditions
+
+
+def hardest_first(judged: Sequence[Judged]) -> list[str]:
+    """Courses with ROC curves, by the areas of the first condition that has any."""
+    for one in judged:
+        areas = {course.course: one.area(course.course) for course in one.courses}
+        met = sorted((area[0], course) for course, area in areas.items() if area is not None)
+        if met:
+            return [course for _, course in met]
+    return []
+
+
+def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
+    """Heading of a report, and how its numbers were chosen and judged."""
+    tuned = judged[0].tuned
+    who = (
+        "They were chosen on some logs and judged on others."
+        if held_out
+        else "The same logs chose and judged them, so the figures flatter."
+    )
+    how = (
+        "Each condition was replayed at the numbers that were given."
+        if tuned.choice.is_free is None
+        else "Each condition was replayed over α, β and leaks; chosen was the soonest that never "
+        f"shifts where it should not, even at a β smaller by a fifth. {who}"
+    )
+    stand_in = shipped_rule(back=tuned.way == "rough")
+    other = "back" if tuned.way == "rough" else "there"
+    return _TITLES[tuned.way], (
+        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. β in "
+        "time and distance: until k exceeds it where all values lie beyond α, at the robots' mean "
+        f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course, at "
+        f"{_area_words(tuned.choice)}. Chattered: robots that would have shifted more than once "
+        f"there and once back for each rough stretch, had they taken the shipped way {other} "
+        f"({SHIPPED}'s: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak {stand_in.leak:g}); the "
+        "gait of the logs stayed. Intervals are of 95 %."
+    )
+
+
+def _area_words(choice: Choice) -> str:
+    """The β of the areas, and why it is another."""
+    if choice.is_free is None:
+        return "the β that was given; none where k cannot exceed it within a passage"
+    return (
+        "the β that told passages apart best on the logs that chose, as k may not reach the chosen "
+        "one within a passage"
+    )
+
+
+def _condition_row(one: Judged) -> Row:
+    tuned, choice = one.tuned, one.tuned.choice
+    tallies = [course.tally for course in one.courses]
+    came, detected, fired = (
+        sum(int(getattr(tally, name)[0, 0]) for tally in tallies)
+        for name in ("came", "detected", "fired")
+    )
+    km = sum(float(tally.km[0, 0]) for tally in tallies)
+    delays = [delay for course in one.courses for delay in course.delays_m]
+    areas = [area for course in one.courses if (area := one.area(course.course)) is not None]
+    soonest = one.soonest if np.isfinite(one.soonest) else None
+    return {
+        "condition": tuned.candidate.name,
+        "alpha": choice.alpha,
+        "unit": tuned.candidate.unit,
+        "beta": choice.beta,
+        "beta_s": soonest,
+        "beta_m": None if soonest is None else soonest * one.speed,
+        "leak": choice.leak,
+        "keeps_still": choice.is_free,
+        "came": came,
+        "detected": detected,
+        "delay_m": float(np.mean(delays)) if delays else None,
+        "false_shifts": fired,
+        "km": km,
+        "robots": sum(tally.robots for tally in tallies),
+        "shifts": sum(course.shifts for course in one.courses),
+        "chattered": sum(course.chattered for course in one.courses),
+        "area": min(area for area, _, _ in areas) if areas else None,
+        "area_beta": tuned.area_beta if areas else None,
+    }
+
+
+def _course_row(one: Judged, course: OnCourse) -> Row:
+    tally = course.tally
+    came, detected, fired = (
+        int(getattr(tally, name)[0, 0]) for name in ("came", "detected", "fired")
+    )
+    km = float(tally.km[0, 0])
+    low, high = (x[0] for x in wilson(np.array([float(detected)]), np.array([float(came)])))
+    least, most = (x[0] for x in poisson(np.array([float(fired)]), np.array([km])))
+    delays = np.array(course.delays_m)
+    area = one.area(course.course)
+    return {
+        "condition": one.tuned.candidate.name,
+        "course": course.course,
+        "robots": tally.robots,
+        "came": came,
+        "detected": detected,
+        "detected_low": float(low) if came else None,
+        "detected_high": float(high) if came else None,
+        "delay_m": float(delays.mean()) if detected else None,
+        "delay_m_p95": float(np.quantile(delays, 0.95)) if detected else None,
+        "delay_s": float(tally.delay_s[0, 0]) if detected else None,
+        "false_shifts": fired,
+        "km": km,
+        "false_per_km": fired / km if km else None,
+        "false_per_km_low": float(least) if km else None,
+        "false_per_km_high": float(most) if km else None,
+        "shifts": course.shifts,
+        "chattered": course.chattered,
+        "area": None if area is None else area[0],
+        "area_low": None if area is None else area[1],
+        "area_high": None if area is None else area[2],
+        "area_beta": None if area is None else one.tuned.area_beta,
+    }
+
+
+def _readme(
+    judged: Sequence[Judged],
+    conditions: Sequence[Row],
+    courses: Sequence[Row],
+    command: str,
+    held_out: bool,
+    pictures: Mapping[str, str],
+) -> str:
+    title, words = introduction(judged, held_out)
+    parts = [
+        f"# {title}",
+        words,
+        f"Made by `{command}`. [As a page](page.html) to hover over and zoom into.",
+        "## Side by side",
+    ]
+    parts.append(_table(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
+    parts += [
+        f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "
+        "chose: the one with the fewest false shifts a kilometre was taken."
+        for one in judged
+        if one.tuned.choice.is_free is False
+    ]
+    parts += [f"![{line}]({name})" for name, line in pictures.items()]
+    for one in judged:
+        name = one.tuned.candidate.name
+        parts += [f"## {name}", one.tuned.candidate.note.capitalize() + "."]
+        of = [row for row in courses if row["condition"] == name]
+        parts.append(_table(COURSES_HEAD, [course_cells(row) for row in of]))
+    return "\n\n".join(parts) + "\n"
+
+
+CONDITIONS_HEAD = (
+    *("condition", "α", "β", "β [s]", "β [m]", "leak"),
+    *("noticed", "mean delay [m]", "false shifts", "chattered", "area", "at β"),
+)
+"""Above the cells of `condition_cells`."""
+
+
+def condition_cells(row: Row) -> tuple[str, ...]:
+    """One of `condition_rows` as text."""
+    return (
+        row["condition"],
+        f"{row['alpha']:.3g} {row['unit']}".strip(),
+        f"{row['beta']:g}",
+        _number(row["beta_s"], 2),
+        _number(row["beta_m"], 2),
+        f"{row['leak']:g}",
+        f"{row['detected']} of {row['came']}",
+        _number(row["delay_m"], 2),
+        f"{row['false_shifts']} in {row['km']:.2f} km",
+        f"{row['chattered']} of {row['robots']}",
+        _number(row["area"], 4) or "–",
+        "–" if row["area_beta"] is None else f"{row['area_beta']:g}",
+    )
+
+
+COURSES_HEAD = (
+    *("course", "noticed", "delay [m]", "95 % within [m]", "delay [s]"),
+    *("false shifts", "a km, 95 %", "chattered", "area", "at β"),
+)
+"""Above the cells of `course_cells`."""
+
+
+def course_cells(row: Row) -> tuple[str, ...]:
+    """One of `course_rows` as text."""
+    low, high = row["false_per_km_low"], row["false_per_km_high"]
+    return (
+        row["course"],
+        f"{row['detected']} of {row['came']}" if row["came"] else "",
+        _number(row["delay_m"], 2),
+        _number(row["delay_m_p95"], 2),
+        _number(row["delay_s"], 2),
+        f"{row['false_shifts']} in {row['km']:.2f} km" if row["km"] else "",
+        f"{low:.2g} to {high:.2g}" if row["km"] else "",
+        f"{row['chattered']} of {row['robots']}",
+        ("–" if row["came"] else "")
+        if row["area"] is None
+        else f"{row['area']:.4f} ({row['area_low']:.3f} to {row['area_high']:.3f})",
+        "" if row["area_beta"] is None else f"{row['area_beta']:g}",
+    )
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "" if value is None else f"{value:.{digits}f}"

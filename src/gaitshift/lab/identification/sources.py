@@ -1,0 +1,47 @@
+"""Recordings out of files: our npz logs, and tables of anybody's robot."""
+
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.labels import rough_ground
+from gaitshift.lab.identification.recording import Recording, Way
+from gaitshift.lab.identification.table import passages
+from gaitshift.lab.log import Log
+
+TABLES = (".csv", ".parquet")
+"""Endings of tables."""
+
+_SEED = re.compile(r"-\d+$")
+
+
+def check_sources(paths: Sequence[Path]) -> None:
+    """`GaitshiftError` unless all are files of a kind that can be read: asked before any work."""
+    for path in paths:
+        if not path.is_file():
+            raise GaitshiftError(f"no log file {path}")
+        if path.suffix not in (".npz", *TABLES):
+            raise GaitshiftError(
+                f"{path}: a log ends in .npz, or is a table in {' or '.join(TABLES)}"
+            )
+
+
+def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[Recording]:
+    """What the files hold, one after the other, tables passage by passage for this way.
+
+    A recording has the name of its file, less a seed at its end.
+
+    Raises:
+        GaitshiftError: a file cannot be read, with what is wrong in it.
+    """
+    for path in paths:
+        if path.suffix in TABLES:
+            yield from passages(path, way)
+            continue
+        log = Log.load(path)
+        if not log.contact.any():
+            raise GaitshiftError(
+                f"{path}: no foot ever touches; 'contact' is true where one is down"
+            )
+        yield Recording.from_log(log, _SEED.sub("", path.stem), rough_ground(log))

@@ -1,0 +1,262 @@
+"""Logs of anybody's robot: CSV or Parquet, read in a stream and cut into passages."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.recording import Recording, Way
+from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
+from gaitshift.robot.legs import LEGS
+from gaitshift.shift import LegOdometry
+
+_AXES = ("x", "y", "z")
+CONTACTS = tuple(f"contact_{leg}" for leg in LEGS)
+FEET = tuple(f"foot_{leg}_{axis}" for leg in LEGS for axis in _AXES)
+REQUIRED = ("time", *CONTACTS, *FEET, "rough")
+"""Columns that every log has: s, 0 or 1, m in the body frame, and 0 or 1."""
+
+ATTITUDES = (tuple(f"gravity_{axis}" for axis in _AXES), ("roll", "pitch"))
+"""One of them is needed: the direction of gravity in the body frame, or two angles [rad]."""
+
+VECTORS = {"velocity_b": "velocity", "angular_velocity_b": "angular_velocity"}
+"""Optional signals of three columns: `velocity_x` and so on, body frame [m/s], [rad/s]."""
+
+SCALARS = ("yaw", "power", "speed_command", "stride", "value")
+"""Optional signals of one column each; units as in `Signals`."""
+
+BATCH, BLOCK = 65_536, 1 << 24
+"""What is read at a time: rows of a Parquet file, bytes of a CSV file."""
+
+LONGEST = 60_000
+"""Rows of a passage; a longer stretch is cut."""
+
+_LEAST_GRAVITY = 1e-6
+"""Length below which a vector of gravity has no direction, in whatever unit it is."""
+
+_KNOWN = (
+    *REQUIRED,
+    *(name for names in ATTITUDES for name in names),
+    *SCALARS,
+    *(f"{prefix}_{axis}" for prefix in VECTORS.values() for axis in _AXES),
+)
+
+
+def columns_of(signal: str) -> tuple[str, ...]:
+    """Columns that an optional signal is read from."""
+    prefix = VECTORS.get(signal)
+    return (signal,) if prefix is None else tuple(f"{prefix}_{axis}" for axis in _AXES)
+
+
+def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
+    """The passages of a log: smooth ground up to where it ends, and the rough ground behind it.
+
+    On the way to flat ground it is rough ground, and the smooth ground behind it. Rough ground that
+    a log begins on was not come to, and is left out where smooth ground follows. A file is read
+    batch by batch, so that gigabytes need no more memory than a passage.
+
+    Raises:
+        GaitshiftError: what the file lacks or has wrong, with the row where there is one.
+    """
+    columns: dict[str, list[np.ndarray]] = {}
+    rows, before, period, touched, down = 0, np.nan, np.nan, False, 0.0
+    may_begin_rough = way == "rough"
+    for batch in _batches(path):
+        _check_columns(path, batch)
+        period = _check_values(path, batch, rows, before, period)
+        before = float(batch["time"][-1])
+        down += _down(path, batch, rows, down)
+        touched = touched or any(batch[name].any() for name in CONTACTS)
+        rows += len(batch["time"])
+        for name, values in batch.items():
+            columns.setdefault(name, []).append(values)
+        whole = {name: np.concatenate(parts) for name, parts in columns.items()}
+        rough = whole["rough"] > 0.5
+        start = 0
+        for end in _ends(rough if way == "rough" else ~rough):
+            not_come_to = may_begin_rough and rough[start:end].all() and not rough[end]
+            may_begin_rough = False
+            if end - start > 1 and not not_come_to:
+                yield _recording(path, whole, slice(start, end))
+            start = end
+        columns = {name: [values[start:]] for name, values in whole.items()}
+    if rows < 2:
+        there = "there are no rows" if rows == 0 else "there is one row alone"
+        raise GaitshiftError(f"{path}: {there} in it; a row a control step would be right")
+    if not touched:
+        raise GaitshiftError(f"{path}: no foot ever touches; contacts are 1 where a foot is down")
+    whole = {name: np.concatenate(parts) for name, parts in columns.items()}
+    if len(whole["time"]) > 1:
+        yield _recording(path, whole, slice(0, len(whole["time"])))
+
+
+def _batches(path: Path) -> Iterator[dict[str, np.ndarray]]:
+    """Batches of rows, as arrays by the names of their columns."""
+    import pyarrow as pa  # only where a table is read
+    from pyarrow import csv, parquet
+
+    if not path.is_file():
+        raise GaitshiftError(f"no log file {path}")
+    from_parquet, from_csv = cast(Any, parquet), cast(Any, csv)
+    # Contacts and labels may be true and false; a number may begin as if it were a whole one.
+    arrow = cast(Any, pa)
+    numbers = {name: arrow.float64() for name in _KNOWN if name not in (*CONTACTS, "rough")}
+    try:
+        if path.suffix == ".parquet":
+            with from_parquet.ParquetFile(path) as file:
+                for batch in file.iter_batches(BATCH):
+                    yield _arrays(path, batch)
+        else:
+            read = from_csv.ReadOptions(block_size=BLOCK)
+            convert = from_csv.ConvertOptions(column_types=numbers)
+            with from_csv.open_csv(path, read_options=read, convert_options=convert) as file:
+                for batch in file:
+                    yield _arrays(path, batch)
+    except UnicodeError as error:
+        raise GaitshiftError(f"{path} is not written in UTF-8: {error}") from error
+    except (arrow.ArrowException, OSError) as error:
+        line = (str(error).splitlines() or [type(error).__name__])[0]
+        raise GaitshiftError(f"{path} cannot be read as {path.suffix[1:]}: {line}") from error
+
+
+def _arrays(path: Path, batch: Any) -> dict[str, np.ndarray]:
+    read: dict[str, np.ndarray] = {}
+    for name, column in zip(batch.schema.names, batch.columns, strict=True):
+        if name not in _KNOWN:
+            continue
+        try:
+            read[name] = column.cast("float64", safe=False).to_numpy(zero_copy_only=False)
+        except Exception as error:  # arrow has an error for each type
+            raise GaitshiftError(f"{path}: column '{name}' does not hold numbers") from error
+    return read
+
+
+def _check_columns(path: Path, batch: dict[str, np.ndarray]) -> None:
+    missing = [name for name in REQUIRED if name not in batch]
+    if missing:
+        legs = ", ".join(LEGS)
+        raise GaitshiftError(
+            f"{path} lacks the column '{missing[0]}'; it takes time, rough, contact_LEG and "
+            f"foot_LEG_x, _y, _z for the legs {legs}"
+        )
+    if not any(all(name in batch for name in names) for names in ATTITUDES):
+        raise GaitshiftError(
+            f"{path} lacks the attitude: gravity_x, gravity_y, gravity_z, or roll and pitch"
+        )
+
+
+def _check_values(
+    path: Path, batch: dict[str, np.ndarray], rows: int, before: float, period: float
+) -> float:
+    """Refuses what is not a number or not in step; the time between two rows [s]."""
+    for name, values in batch.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise GaitshiftError(f"{path}: row {rows + bad[0] + 1}, '{name}' is not a number")
+    apart = np.diff(batch["time"], prepend=before)
+    wrong = np.flatnonzero(apart <= 0)
+    if wrong.size:
+        raise GaitshiftError(
+            f"{path}: row {rows + wrong[0] + 1}, time does not rise; rows must be in order, each "
+            "time once"
+        )
+    if np.isnan(period):
+        known = apart[np.isfinite(apart)]
+        period = float(known[0]) if known.size else np.nan
+        if known.size and not LEAST_PERIOD <= period <= MOST_PERIOD:
+            raise GaitshiftError(
+                f"{path}: rows are {period:.4g} apart in 'time'; it is in seconds, and "
+                f"{LEAST_PERIOD:g} to {MOST_PERIOD:g} s would be right"
+            )
+    changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
+    if changed.size:
+        raise GaitshiftError(
+            f"{path}: row {rows + changed[0] + 1} comes {apart[changed[0]]:.4g} s after the one "
+            f"before, the first ones {period:.4g} s: one rate throughout would be right"
+        )
+    return period
+
+
+def _down(path: Path, batch: dict[str, np.ndarray], rows: int, before: float) -> float:
+    """Sum of the vertical parts of gravity in a batch; `before` is that of the rows before it.
+
+    Raises:
+        GaitshiftError: gravity has no direction in a row, or points up on average.
+    """
+    vector, angles = ATTITUDES
+    names = vector if all(name in batch for name in vector) else angles
+    if names is vector:
+        length = np.linalg.norm(np.stack([batch[name] for name in vector]), axis=0)
+        none = np.flatnonzero(length < _LEAST_GRAVITY)
+        if none.size:
+            raise GaitshiftError(
+                f"{path}: row {rows + none[0] + 1}, gravity_x, _y, _z are 0 and point nowhere; "
+                "(0, 0, -1) when level would be right"
+            )
+    down = float(_gravity(batch)[:, 2].sum())
+    if before + down > 0.0:
+        right = "gravity_z = -1" if names is vector else "roll = pitch = 0 rad"
+        raise GaitshiftError(
+            f"{path}: by {', '.join(names)} gravity points up on average; {right} when level "
+            "would be right"
+        )
+    return down
+
+
+def _ends(rough: np.ndarray) -> list[int]:
+    """Where rough ground ends, and where a stretch has become too long."""
+    ends = [int(last) + 1 for last in np.flatnonzero(rough[:-1] & ~rough[1:])]
+    start, cuts = 0, list[int]()
+    for end in [*ends, len(rough)]:
+        cuts += range(start + LONGEST, end, LONGEST)
+        start = end
+    return sorted([*ends, *cuts])
+
+
+def _recording(path: Path, columns: dict[str, np.ndarray], rows: slice) -> Recording:
+    """One robot over these rows."""
+    cut = {name: values[rows] for name, values in columns.items()}
+    optional: dict[str, Any] = {name: cut[name][:, None] for name in SCALARS if name in cut}
+    for name, prefix in VECTORS.items():
+        parts = [f"{prefix}_{axis}" for axis in _AXES]
+        if all(part in cut for part in parts):
+            optional[name] = np.stack([cut[part] for part in parts], axis=1)[:, None]
+    steps = len(cut["time"])
+    recording = Recording(
+        name=path.name,
+        time=cut["time"],
+        contact=np.stack([cut[name] > 0.5 for name in CONTACTS], axis=1)[:, None],
+        foot_position_b=np.stack([cut[name] for name in FEET], axis=1).reshape(steps, 1, 4, 3),
+        gravity_b=_gravity(cut)[:, None],
+        rough=cut["rough"][:, None] > 0.5,
+        alive=np.ones((steps, 1), dtype=bool),
+        distance=np.zeros((steps, 1)),
+        **optional,
+    )
+    return _with_distance(recording)
+
+
+def _gravity(columns: dict[str, np.ndarray]) -> Float[np.ndarray, "T 3"]:
+    """Direction of gravity in the body frame, as it stands or by roll and pitch."""
+    vector, angles = ATTITUDES
+    if all(name in columns for name in vector):
+        gravity = np.stack([columns[name] for name in vector], axis=1)
+        return gravity / np.linalg.norm(gravity, axis=1, keepdims=True)
+    roll, pitch = (columns[name] for name in angles)
+    level = np.cos(pitch)
+    return np.stack([np.sin(pitch), -np.sin(roll) * level, -np.cos(roll) * level], axis=1)
+
+
+def _with_distance(recording: Recording) -> Recording:
+    """The same with the way that leg odometry makes of it."""
+    odometry = LegOdometry()
+    state, base = odometry.start(1), np.empty((len(recording.time), 2))
+    for t, signals in enumerate(recording):
+        state, _ = odometry.step(state, signals)
+        base[t] = state.base[0, :2]
+    step = np.linalg.norm(np.diff(base, axis=0, prepend=base[:1]), axis=1)
+    return replace(recording, distance=step.cumsum()[:, None])

@@ -1,0 +1,148 @@
+"""Identification from files: conditions tuned on some logs and judged on others."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.candidates import CANDIDATES, Candidate, candidates
+from gaitshift.lab.identification.classifier import NAME, RoughnessClassifier
+from gaitshift.lab.identification.judging import Judged, Replayed, judge, replay_rules
+from gaitshift.lab.identification.kept import Kept, Stamp, stamp
+from gaitshift.lab.identification.recording import Way
+from gaitshift.lab.identification.sources import check_sources, recordings
+from gaitshift.lab.identification.tuning import Tried, Tuned, as_given, try_grids, tune
+
+ALL = "all"
+"""Stands for every condition that the logs feed."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """α, β and leak that are to be judged, and not chosen."""
+
+    alpha: float
+    """In the condition's unit."""
+    beta: float
+    """[counts]"""
+    leak: float = 0.0
+    """[counts a step]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """What is asked for."""
+
+    logs: tuple[Path, ...]
+    """Logs that choose the numbers."""
+    held_out: tuple[Path, ...] = ()
+    """Logs that judge them; without them the same ones do."""
+    conditions: tuple[str, ...]
+    """Their names, or `ALL`."""
+    way: Way = "rough"
+    """What is to be noticed."""
+    numbers: Numbers | None = None
+    """None: they are chosen."""
+
+    def __post_init__(self) -> None:
+        if self.everything and self.numbers is not None:
+            raise GaitshiftError("α has another unit in each condition: name those for --alpha")
+        _ = self.wanted  # every name is known
+        check_sources((*self.logs, *self.held_out))
+        choosing = {path.resolve() for path in self.logs}
+        for path in self.held_out:
+            if path.resolve() in choosing:
+                raise GaitshiftError(
+                    f"{path} is given twice, to choose the numbers and with --held-out; logs of "
+                    "other seeds would be right"
+                )
+
+    @property
+    def everything(self) -> bool:
+        """Whether all conditions are asked for."""
+        return ALL in self.conditions
+
+    @property
+    def wanted(self) -> tuple[Candidate, ...]:
+        """All but the classifier, which is fitted first; `GaitshiftError` if one is unknown."""
+        named = candidates([name for name in self.conditions if name not in (NAME, ALL)])
+        return CANDIDATES if self.everything else named
+
+    @property
+    def judges(self) -> tuple[Path, ...]:
+        """Logs that judge."""
+        return self.held_out or self.logs
+
+    def run(self, folder: Path, report: Callable[[str], None]) -> list[Judged]:
+        """Tunes and judges, log by log; what is found out is kept in `folder`, and known again.
+
+        Raises:
+            GaitshiftError: a log cannot be read, lacks the signals of a condition that was named,
+                or all of them are of one kind of ground.
+        """
+        kept = Kept(folder, report)
+        learned = tuple(map(stamp, self.logs))
+        classifier = self._fitted(kept, learned, report)
+        if classifier is None:
+            learned = ()
+        tuned = self._tuned(kept, classifier, learned)
+        if classifier is not None:  # robots that judge were seen by neither half of it
+            known = classifier.candidate(crosswise=False)
+            tuned = [replace(t, candidate=known) if t.candidate.name == NAME else t for t in tuned]
+        replayed = Replayed()
+        rules = [(one.candidate.name, one.rule, one.area_beta) for one in tuned]
+        for log in self.judges:
+            work = partial(_replay, tuned, log, self.way)
+            about = (self.way, rules, learned, stamp(log))
+            replayed.join(kept.get(f"judging: {log.stem}", about, work))
+        return judge(tuned, replayed)
+
+    def _fitted(
+        self, kept: Kept, learned: tuple[Stamp, ...], report: Callable[[str], None]
+    ) -> RoughnessClassifier | None:
+        """The classifier, where it is asked for and can learn."""
+        if not self.everything and NAME not in self.conditions:
+            return None
+        work = partial(_fit, self.logs, self.way)
+        try:
+            return kept.get("fitting the classifier", (self.way, learned), work)
+        except GaitshiftError as error:
+            if not self.everything:
+                raise
+            report(f"{error}; it is left out")
+            return None
+
+    def _tuned(
+        self, kept: Kept, classifier: RoughnessClassifier | None, learned: tuple[Stamp, ...]
+    ) -> list[Tuned]:
+        wanted = list(self.wanted)
+        if classifier is not None:
+            wanted.append(classifier.candidate(crosswise=True))
+        if self.numbers is not None:
+            return as_given(wanted, way=self.way, **asdict(self.numbers))
+        tried = Tried(way=self.way)
+        names = [candidate.name for candidate in wanted]
+        for log in self.logs:
+            work = partial(_try, wanted, log, self.way)
+            about = (self.way, names, learned, stamp(log))
+            tried.join(kept.get(f"choosing: {log.stem}", about, work))
+        tuned = tune(wanted, tried)
+        found = {one.candidate.name for one in tuned}
+        left_out = [name for name in names if name not in found]
+        if left_out and not self.everything:
+            lacks = ", ".join(tried.lacking[left_out[0]])
+            raise GaitshiftError(f"the logs lack the signals of '{left_out[0]}': it needs {lacks}")
+        return tuned
+
+
+def _fit(logs: Sequence[Path], way: Way) -> RoughnessClassifier:
+    return RoughnessClassifier.fit(recordings(logs, way))
+
+
+def _try(wanted: Sequence[Candidate], log: Path, way: Way) -> Tried:
+    return try_grids(wanted, recordings([log], way), way)
+
+
+def _replay(tuned: Sequence[Tuned], log: Path, way: Way) -> Replayed:
+    return replay_rules(tuned, recordings([log], way))

@@ -1,0 +1,182 @@
+"""The numbers that recordings choose: every α, β and leak of each candidate, tried on them."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.candidates import BETAS, Candidate
+from gaitshift.lab.identification.choice import Choice, choose
+from gaitshift.lab.identification.facing import facing
+from gaitshift.lab.identification.grid import first_firings
+from gaitshift.lab.identification.passage import GridScores, best_beta, passage_grid
+from gaitshift.lab.identification.recording import Recording, Way
+from gaitshift.lab.identification.tally import Grid, Tally, join_by_name
+from gaitshift.shift import Rule
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tuned:
+    """A candidate with its numbers."""
+
+    candidate: Candidate
+    """The condition."""
+    way: Way
+    """What it is to notice."""
+    choice: Choice
+    """α, β and leak."""
+    grid: Grid
+    """What was tried."""
+    tally: Tally
+    """What came of it over the recordings that chose, at the chosen leak."""
+    area_beta: float
+    """β at which passages are scored for ROC curves [counts]: of the grid's the one of the largest
+    mean area on the recordings that chose, as k may not reach the chosen β within a passage; where
+    numbers were given, the one that was given."""
+
+    @property
+    def rule(self) -> Rule:
+        """The rule that was chosen."""
+        return _rule(self.way, self.choice.alpha, self.choice.beta, self.choice.leak)
+
+    @property
+    def area_rule(self) -> Rule:
+        """The rule by which passages are scored."""
+        return replace(self.rule, beta=self.area_beta)
+
+
+@dataclass(kw_only=True)
+class OnGrid:
+    """What came of a candidate at one leak, at each α and β, on the recordings of one name."""
+
+    tally: Tally
+    """Detections and false shifts."""
+    scores: GridScores = field(default_factory=lambda: {True: [], False: []})
+    """Of each passage."""
+
+    def join(self, other: "OnGrid") -> None:
+        """Takes in all that another one has."""
+        self.tally.join(other.tally)
+        for is_wanted, rows in other.scores.items():
+            self.scores[is_wanted] += rows
+
+
+@dataclass(kw_only=True)
+class Tried:
+    """What came of whole grids on some recordings; that of others may join it."""
+
+    way: Way
+    """What was to be noticed."""
+    found: dict[str, dict[float, dict[str, OnGrid]]] = field(default_factory=dict)
+    """By candidate, by leak, by the name of the recordings."""
+    lacking: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """What a recording lacked, by the candidates that it did not feed."""
+
+    def on(self, candidate: Candidate, leak: float, course: str) -> OnGrid:
+        """Where to count what comes of a candidate; made where there is none."""
+        by_leak = self.found.setdefault(candidate.name, {})
+        tally = Tally(shape=_grid(candidate, self.way).shape)
+        return by_leak.setdefault(leak, {}).setdefault(course, OnGrid(tally=tally))
+
+    def join(self, other: "Tried") -> None:
+        """Takes in all that another one has."""
+        self.lacking |= other.lacking
+        for name, by_leak in other.found.items():
+            for leak, by_course in by_leak.items():
+                join_by_name(self.found.setdefault(name, {}).setdefault(leak, {}), by_course)
+
+
+def try_grids(candidates: Sequence[Candidate], recordings: Iterable[Recording], way: Way) -> Tried:
+    """Replays each candidate that a recording feeds, at each α, β and leak that it is tried at."""
+    tried = Tried(way=way)
+    for recording in recordings:
+        for candidate in candidates:
+            if missing := candidate.missing(recording):
+                tried.lacking[candidate.name] = missing
+                continue
+            values = candidate.values(recording)  # an oracle sees the ground as it is
+            seen, values = facing(recording, values, way)
+            grid = _grid(candidate, way)
+            for leak in candidate.leaks:
+                rule = _rule(way, 1.0, 1.0, leak)
+                first = first_firings(values, seen.alive, rule, grid.alphas, grid.betas)
+                one = tried.on(candidate, leak, seen.name)
+                one.tally.add(seen, first)
+                of = passage_grid(seen, values, rule, grid.alphas, grid.betas)
+                for is_wanted, rows in of.items():
+                    one.scores[is_wanted] += rows
+    return tried
+
+
+def tune(candidates: Sequence[Candidate], tried: Tried) -> list[Tuned]:
+    """The numbers of each candidate that the recordings choose.
+
+    Candidates that no recording feeds are left out.
+
+    Raises:
+        GaitshiftError: no rough ground, or no smooth ground, in the recordings.
+    """
+    found: list[Tuned] = []
+    for candidate in candidates:
+        if candidate.name not in tried.found:
+            continue
+        grid = _grid(candidate, tried.way)
+        tallies = {
+            leak: {course: one.tally for course, one in by_course.items()}
+            for leak, by_course in tried.found[candidate.name].items()
+        }
+        choice = choose(tallies, grid, _rule(tried.way, 1.0, 1.0, 0.0).when)
+        chosen = tried.found[candidate.name][choice.leak]
+        whole = Tally(shape=grid.shape)
+        for one in chosen.values():
+            whole.join(one.tally)
+        scores = {course: one.scores for course, one in chosen.items()}
+        found.append(
+            Tuned(
+                candidate=candidate,
+                way=tried.way,
+                choice=choice,
+                grid=grid,
+                tally=whole,
+                area_beta=best_beta(scores, grid.betas, choice.beta),
+            )
+        )
+    if not found:
+        needs = "; ".join(f"'{name}' needs {', '.join(of)}" for name, of in tried.lacking.items())
+        raise GaitshiftError(
+            f"the logs lack the signals of every condition that was asked for: {needs}"
+            if needs
+            else "no recordings to choose by"
+        )
+    return found
+
+
+def as_given(
+    candidates: Sequence[Candidate], *, way: Way, alpha: float, beta: float, leak: float = 0.0
+) -> list[Tuned]:
+    """Each candidate with the same numbers, which nobody chose: to see what they do.
+
+    Raises:
+        GaitshiftError: a number out of range.
+    """
+    _ = _rule(way, alpha, beta, leak)
+    grids = [_grid(candidate, way) for candidate in candidates]
+    return [
+        Tuned(
+            candidate=candidate,
+            way=way,
+            choice=Choice(alpha=alpha, beta=beta, leak=leak),
+            grid=grid,
+            tally=Tally(shape=grid.shape),
+            area_beta=beta,
+        )
+        for candidate, grid in zip(candidates, grids, strict=True)
+    ]
+
+
+def _grid(candidate: Candidate, way: Way) -> Grid:
+    return Grid(alphas=candidate.alphas(way), betas=BETAS)
+
+
+def _rule(way: Way, alpha: float, beta: float, leak: float) -> Rule:
+    when = "above" if way == "rough" else "below"
+    return Rule(when=when, alpha=alpha, beta=beta, leak=leak)

@@ -1,0 +1,242 @@
+"""What the paper says, what was measured, and whether it holds: a row a statement."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from gaitshift.lab.reproduction.landmarks import (
+    GAITS,
+    LEARNED_BY,
+    PLATEAU,
+    START,
+    ZERO_CROSSING,
+)
+from gaitshift.lab.reproduction.plan import ABLATED
+from gaitshift.lab.reproduction.results import Results, Seeds
+from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER
+
+Verdict = Literal["holds", "holds in part", "does not hold"]
+
+START_WITHIN, PLATEAU_WITHIN, CROSSING_WITHIN = 10.0, 5.0, 2.0
+"""How near to the paper's curves counts as the same: rewards a step, and a factor on iterations."""
+
+MOST_CHANGES = 12.0
+"""Changes of state a second beyond which feet vibrate and do not walk; ours: a stride of 6 Hz."""
+
+LATER = 1.1
+"""Factor on the iteration from which robots walk that counts as later."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One statement of the paper, held against the runs."""
+
+    name: str
+    """Its topic."""
+    paper: str
+    """What the paper says, in our words, and where."""
+    measured: str
+    """What the runs say."""
+    verdict: Verdict
+    """Whether it holds."""
+
+
+def findings(results: Results) -> list[Finding]:
+    """Every statement that the runs at hand can speak of."""
+    gaits = dict(results.gaits())
+    found: list[Finding] = []
+    if len(gaits) == len(GAITS):
+        found += [_all_come_out(gaits), _learned_early(gaits), _order(gaits), _curves(gaits)]
+    reference = results.reference
+    if reference is not None:
+        ablations = dict(results.ablations())
+        for group, (paper, deciding, judge) in _COMPARISONS.items():
+            settings = [s for s in ABLATIONS if s.group == group and s.name in ablations]
+            if deciding not in ablations:
+                continue
+            others = [ablations[s.name] for s in settings]
+            labels = [AS_IN_THE_PAPER[group], *(s.label for s in settings)]
+            told = [_told(*pair) for pair in zip(labels, [reference, *others], strict=True)]
+            found.append(
+                Finding(
+                    name=group,
+                    paper=paper,
+                    measured=f"{ABLATED.capitalize()}. {'. '.join(told)}.",
+                    verdict=judge(reference, ablations[deciding]),
+                )
+            )
+    return found
+
+
+def _all_come_out(gaits: dict[str, Seeds]) -> Finding:
+    told = [
+        f"{gait} in {seeds.walking} of {len(seeds)} seeds ({_number(seeds.late('speed'), '.2f')}"
+        f" m/s, {_number(seeds.late('reward'), '.1f')} reward a step)"
+        for gait, seeds in gaits.items()
+    ]
+    walking = sum(seeds.walking for seeds in gaits.values())
+    return Finding(
+        name="three gaits",
+        paper="All three gaits come out in about 500 iterations (IV-B).",
+        measured=f"At the end robots walk: {', '.join(told)}.",
+        verdict=_grade(walking, sum(map(len, gaits.values()))),
+    )
+
+
+def _learned_early(gaits: dict[str, Seeds]) -> Finding:
+    starts = [course.walks_at for seeds in gaits.values() for course in seeds.courses]
+    early = sum(start is not None and start <= LEARNED_BY for start in starts)
+    verdict: Verdict = "does not hold" if early == 0 else "holds in part"
+    return Finding(
+        name="learned early",
+        paper=f"In most cases {LEARNED_BY} iterations are enough for the right movements (IV-B).",
+        measured=f"{early} of {len(starts)} runs walk from iteration {LEARNED_BY} or before.",
+        verdict="holds" if early > len(starts) / 2 else verdict,
+    )
+
+
+def _order(gaits: dict[str, Seeds]) -> Finding:
+    first = [_or_never(gaits[gait].walk_from) for gait in GAITS]
+    told = [f"{gait} {_iteration(gaits[gait].walk_from)}" for gait in GAITS]
+    in_order = [a < b for a, b in pairwise(first)]
+    return Finding(
+        name="order",
+        paper="Trot is learned first, bound comes next, pace takes longest (IV-B).",
+        measured=f"The median run walks from iteration: {', '.join(told)}.",
+        verdict=_grade(sum(in_order), len(in_order)),
+    )
+
+
+def _curves(gaits: dict[str, Seeds]) -> Finding:
+    told: list[str] = []
+    near: list[bool] = []
+    for gait, seeds in gaits.items():
+        start = float(np.mean([c.reward[0] for c in seeds.courses if len(c)] or [np.nan]))
+        late, crossing = seeds.late("reward"), seeds.cross_zero_at
+        told.append(
+            f"{gait} starts at {start:.0f}, is positive from iteration {_iteration(crossing)}"
+            f" (paper: {ZERO_CROSSING[gait]}) and ends at {_number(late, '.1f')}"
+        )
+        low, high = PLATEAU[0] - PLATEAU_WITHIN, PLATEAU[1] + PLATEAU_WITHIN
+        ratio = _or_never(crossing) / ZERO_CROSSING[gait]
+        near += [
+            abs(start - START) <= START_WITHIN,
+            late is not None and low <= late <= high,
+            1 / CROSSING_WITHIN <= ratio <= CROSSING_WITHIN,
+        ]
+    text = "; ".join(told)
+    return Finding(
+        name="reward curves",
+        paper=(
+            f"Rewards start near {START:g} a step, cross zero near iteration "
+            f"{', '.join(f'{n} ({gait})' for gait, n in ZERO_CROSSING.items())}, and end at "
+            f"{PLATEAU[0]:g} to {PLATEAU[1]:g} (read off Fig. 1)."
+        ),
+        measured=(
+            f"{text[0].upper()}{text[1:]}. {sum(near)} of these {len(near)} figures are near the "
+            f"paper's: within {START_WITHIN:g} a step at the start and {PLATEAU_WITHIN:g} at the "
+            f"end, and a factor of {CROSSING_WITHIN:g} at the crossing."
+        ),
+        verdict=_grade(sum(near), len(near)),
+    )
+
+
+def _works_as_printed(reference: Seeds, other: Seeds) -> Verdict:
+    return _grade(other.walking, len(other))
+
+
+def _walks_without_lockout(reference: Seeds, other: Seeds) -> Verdict:
+    changes = other.late("changes_per_s")
+    walks = changes is not None and changes <= MOST_CHANGES
+    return _grade(other.walking, len(other)) if walks else "does not hold"
+
+
+def _is_needed(reference: Seeds, other: Seeds) -> Verdict:
+    fewer = other.walking / len(other) < reference.walking / len(reference)
+    later = _or_never(other.walk_from) > LATER * _or_never(reference.walk_from)
+    return "holds" if fewer or later else "does not hold"
+
+
+def _speeds_up(reference: Seeds, other: Seeds) -> Verdict:
+    fewer = other.moving / len(other) < reference.moving / len(reference)
+    later = _or_never(other.move_from) > LATER * _or_never(reference.move_from)
+    return _grade(fewer + later, 2)
+
+
+def _is_spared(reference: Seeds, other: Seeds) -> Verdict:
+    if reference.walking < len(reference):
+        return _grade(reference.walking, len(reference))
+    quicker = _or_never(other.walk_from) > LATER * _or_never(reference.walk_from)
+    return "holds" if quicker else "holds in part"
+
+
+_COMPARISONS = {
+    "bonus": (
+        "At a change of state the total reward is multiplied by b = 200 (III-C).",
+        "multiply",
+        _works_as_printed,
+    ),
+    "lock-out": (
+        "The machine's order of contacts is all that a gait takes: no least time between two "
+        "changes is named (III-C).",
+        "lockout-0",
+        _walks_without_lockout,
+    ),
+    "observation": (
+        "The policy sees the machine's state u and the steps δ since it changed: over S × U the "
+        "reward is Markov again (III-B, III-C).",
+        "blind",
+        _is_needed,
+    ),
+    "machine": (
+        "Reward machines make learning a good deal faster, and keep robots from standing still "
+        "(III-D, IV-B).",
+        "no-bonus",
+        _speeds_up,
+    ),
+    "penalties": (
+        "The penalties need no growing factor λ: with full penalties from the start, learning is "
+        "much faster (III-D).",
+        "curriculum",
+        _is_spared,
+    ),
+    "gains": ("Joints are held with Kp = 3 and Kd = 0.2 (IV-A).", "paper-gains", _works_as_printed),
+}
+"""Of each group: the statement, the setting that decides on it, and the judge of the reference and
+that setting."""
+
+
+def _told(label: str, seeds: Seeds) -> str:
+    """How many walk, how many are as fast in any gait, and from when, by the median."""
+    text = (
+        f"**{label}** {seeds.walking} of {len(seeds)} walk "
+        f"({_median(seeds.walk_from)}), {seeds.moving} are as fast in any gait "
+        f"({_median(seeds.move_from)}); at the end {_number(seeds.late('speed'), '.2f')} m/s, "
+        f"{_number(seeds.late('changes_per_s'), '.1f')} changes a second"
+    )
+    broken = sum(seeds.broken)
+    return f"{text}; {broken} broke down" if broken else text
+
+
+def _grade(good: int, of: int) -> Verdict:
+    if good == of:
+        return "holds"
+    return "holds in part" if good else "does not hold"
+
+
+def _or_never(iteration: float | None) -> float:
+    return float("inf") if iteration is None else iteration
+
+
+def _iteration(iteration: float | None) -> str:
+    return "never" if iteration is None else f"{iteration:g}"
+
+
+def _median(iteration: float | None) -> str:
+    return "the median never" if iteration is None else f"median iteration {iteration:g}"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "–" if value is None else format(value, form)

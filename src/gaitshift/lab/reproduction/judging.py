@@ -1,0 +1,87 @@
+"""Trained policies of the paper's setting, judged without exploration noise."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from statistics import fmean
+
+from gaitshift.control import policy
+from gaitshift.lab.evaluation import EvaluationConfig, evaluate
+from gaitshift.lab.log import Log
+from gaitshift.lab.reproduction.results import Results
+from gaitshift.lab.reproduction.told import Told
+from gaitshift.learn.run import POLICY
+
+FIGURES = (
+    "survival",
+    "speed_mean",
+    "pattern_fraction",
+    "cycles_per_s",
+    "touchdowns_per_cycle",
+    "cost_of_transport",
+)
+"""What is told of each policy; touchdowns are the mean over the feet (1: a clean cycle)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judged:
+    """One policy, and how it walked."""
+
+    gait: str
+    """Which gait it is of."""
+    seed: int
+    """Seed of its training."""
+    walks_at: int | None
+    """Iteration of its training from which it walked."""
+    figures: Mapping[str, float | None]
+    """`FIGURES` by name; None what cannot be told of a robot that fell at once."""
+    log: Log | None
+    """The walk itself; None of a policy that an earlier report judged."""
+
+
+def judge(
+    results: Results,
+    runs: Path,
+    told: Told,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> list[Judged]:
+    """Lets every policy of the paper's setting walk on flat ground, but for those told of."""
+    wanted = list(_policies(results))
+    judged: list[Judged] = []
+    plan = results.plan
+    config = EvaluationConfig(episodes=plan.robots, seconds=plan.seconds, seed=plan.seed)
+    for gait, seed, walks_at, name in wanted:
+        path, log = runs / name / POLICY, None
+        if path.is_file():
+            measured, log = evaluate(policy.load(path), config)
+            figures: Mapping[str, float | None] = {key: _one(measured[key]) for key in FIGURES}
+        else:
+            figures = told.figures.get(name, dict.fromkeys(FIGURES))
+        judged.append(Judged(gait=gait, seed=seed, walks_at=walks_at, figures=figures, log=log))
+        report(len(judged), len(wanted))
+    return judged
+
+
+def middle(judged: list[Judged], gait: str) -> Judged | None:
+    """The policy of a gait that shows its pattern neither most nor least."""
+    ordered = sorted(
+        (one for one in judged if one.gait == gait),
+        key=lambda one: one.figures["pattern_fraction"] or 0.0,
+    )
+    return ordered[len(ordered) // 2] if ordered else None
+
+
+def _policies(results: Results) -> Iterator[tuple[str, int, int | None, str]]:
+    for gait, seeds in results.gaits():
+        for job, course, broken in zip(seeds.jobs, seeds.courses, seeds.broken, strict=True):
+            if not broken:
+                yield gait, job.seed, course.walks_at, job.name
+
+
+def _one(value: float | list[float] | None) -> float | None:
+    """The figure, or its mean over the feet; None where there was nothing to measure."""
+    if value is None:
+        return None
+    number = fmean(value) if isinstance(value, list) else float(value)
+    return number if isfinite(number) else None

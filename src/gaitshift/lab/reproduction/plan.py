@@ -1,0 +1,129 @@
+"""Which runs there are: settings × gaits × seeds, and which of them are wanted."""
+
+from dataclasses import dataclass, replace
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine
+from gaitshift.lab.reproduction.landmarks import GAITS
+from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
+from gaitshift.learn.recipe import Recipe
+
+ABLATED = "trot"
+"""The gait that ablations are made with: the one that the paper learns first."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One training run of the plan."""
+
+    setting: Setting
+    """How it is trained."""
+    gait: str
+    """Which gait."""
+    seed: int
+    """Of networks, exploration and starts."""
+    recipe: Recipe
+    """The setting's recipe, cut to the plan's measure."""
+
+    @property
+    def name(self) -> str:
+        """Name of its folder."""
+        return f"{self.setting.name}-{self.gait}-{self.seed}"
+
+    @property
+    def machine(self) -> RewardMachine:
+        """The machine it is trained with."""
+        return self.setting.machine(self.gait)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """All runs, and the measure they are taken by."""
+
+    seed: int = 0
+    """First seed; the others follow it."""
+    seeds: int = 5
+    """Seeds of each gait in the paper's setting."""
+    ablation_seeds: int = 3
+    """Seeds of each ablation."""
+    ablation_iterations: int = 200
+    """Iterations of each ablation, and of the reference where it is held against one; ours: twice
+    what the paper takes to learn a gait, so that all runs fit into an evening."""
+    robots: int = 16
+    """Robots that a trained policy of the paper's setting is judged on."""
+    seconds: float = 10.0
+    """Time that they walk [s]."""
+    quick: bool = False
+    """Tiny runs that learn nothing: they show that everything works."""
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+
+    @classmethod
+    def tiny(cls, seed: int = 0) -> "Plan":
+        """One seed, four iterations, six robots."""
+        return cls(
+            seed=seed,
+            seeds=1,
+            ablation_seeds=1,
+            ablation_iterations=3,
+            robots=2,
+            seconds=3.0,
+            quick=True,
+        )
+
+    @property
+    def jobs(self) -> tuple[Job, ...]:
+        """Every run: those of the paper's setting first, seed by seed, then the ablations."""
+        main = [
+            self._job(REFERENCE, gait, seed)
+            for seed in range(self.seed, self.seed + self.seeds)
+            for gait in GAITS
+        ]
+        ablations = [
+            self._job(setting, ABLATED, seed)
+            for setting in ABLATIONS
+            for seed in range(self.seed, self.seed + self.ablation_seeds)
+        ]
+        return (*main, *ablations)
+
+    def select(self, only: tuple[str, ...]) -> tuple[Job, ...]:
+        """The runs of these gaits (in the paper's setting), settings or groups; all if none.
+
+        With an ablation come the runs of the reference that it is held against.
+        """
+        groups = {setting.name: setting.group for setting in ABLATIONS}
+        known = (PAPER, *GAITS, *dict.fromkeys(groups.values()), *groups)
+        unknown = [name for name in only if name not in known]
+        if unknown:
+            raise GaitshiftError(f"nothing called '{unknown[0]}'; known: {', '.join(known)}")
+        compared = any(name in groups or name in groups.values() for name in only)
+        return tuple(
+            job
+            for job in self.jobs
+            if not only
+            or job.setting.name in only
+            or job.setting.group in only
+            or (job.setting.name == PAPER and job.gait in only)
+            or (compared and self._is_reference(job))
+        )
+
+    def _is_reference(self, job: Job) -> bool:
+        seed_counts = job.seed < self.seed + self.ablation_seeds
+        return job.setting.name == PAPER and job.gait == ABLATED and seed_counts
+
+    def _job(self, setting: Setting, gait: str, seed: int) -> Job:
+        recipe = setting.recipe
+        if self.quick:
+            recipe = _shrunk(recipe)
+        if setting.name != PAPER:
+            recipe = recipe.with_iterations(self.ablation_iterations)
+        return Job(setting=setting, gait=gait, seed=seed, recipe=recipe)
+
+
+def _shrunk(recipe: Recipe) -> Recipe:
+    """The same recipe, too short to learn anything."""
+    ppo = replace(recipe.ppo, epochs=1, mini_batches=2)
+    small = replace(recipe, ppo=ppo, robots=6, steps=12, checkpoint_every=2)
+    return small.with_iterations(4)

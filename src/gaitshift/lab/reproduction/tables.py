@@ -1,0 +1,101 @@
+"""The small CSV files of a reproduction."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from gaitshift.lab.reproduction.courses import DECIMALS
+from gaitshift.lab.reproduction.judging import Judged
+from gaitshift.lab.reproduction.plan import ABLATED
+from gaitshift.lab.reproduction.results import Results, Seeds
+from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
+from gaitshift.lab.reproduction.told import fingerprint
+
+ABLATED_RUNS = "ablations.csv"
+
+Row = dict[str, Any]
+
+
+def gait_rows(judged: list[Judged]) -> list[Row]:
+    """A row a policy of the paper's setting: from when it walked, and how it walks."""
+    return [
+        {
+            "setting": PAPER,
+            "gait": one.gait,
+            "seed": one.seed,
+            "walks_from_iteration": one.walks_at,
+            **{name: _short(value) for name, value in one.figures.items()},
+        }
+        for one in judged
+    ]
+
+
+def ablation_rows(results: Results) -> list[Row]:
+    """A row a setting, the reference first; means over the last tenth of the iterations."""
+    reference = results.reference
+    rows = [] if reference is None else [_ablation_row(REFERENCE, reference)]
+    settings = {setting.name: setting for setting in ABLATIONS}
+    return rows + [_ablation_row(settings[name], seeds) for name, seeds in results.ablations()]
+
+
+def run_rows(results: Results) -> list[Row]:
+    """A row a run: how far it came, and which recipe it is of."""
+    return [
+        {
+            "setting": job.setting.name,
+            "gait": job.gait,
+            "seed": job.seed,
+            "iterations": len(course),
+            "broke_down": broken,
+            "recipe": fingerprint(job),
+        }
+        for seeds in results.seeds.values()
+        for job, course, broken in zip(seeds.jobs, seeds.courses, seeds.broken, strict=True)
+    ]
+
+
+def curve_rows(results: Results) -> Iterator[Row]:
+    """A row an iteration of every run."""
+    for (setting, gait), seeds in results.seeds.items():
+        for job, course in zip(seeds.jobs, seeds.courses, strict=True):
+            run: Row = {"setting": setting, "gait": gait, "seed": job.seed}
+            columns = [
+                [f"{value:.{digits}f}" for value in getattr(course, name)]
+                for name, digits in DECIMALS.items()
+            ]
+            for index, entries in enumerate(zip(*columns, strict=True)):
+                yield {**run, "iteration": index + 1, **dict(zip(DECIMALS, entries, strict=True))}
+
+
+def write(rows: list[Row], path: Path) -> None:
+    """Writes rows of the same columns."""
+    with path.open("w", newline="") as file:
+        lines = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
+        lines.writeheader()
+        lines.writerows(rows)
+
+
+def _ablation_row(setting: Setting, seeds: Seeds) -> Row:
+    late = {
+        f"late_{name}": seeds.late(name)
+        for name in ("speed", "survival", "changes_per_s", "stance_fraction")
+    }
+    return {
+        "group": setting.group,
+        "setting": setting.name,
+        "label": setting.label,
+        "gait": ABLATED,
+        "seeds": len(seeds),
+        "broke_down": sum(seeds.broken),
+        "iterations": max(map(len, seeds.courses)),
+        "walking": seeds.walking,
+        "walk_from_iteration": seeds.walk_from,
+        "as_fast": seeds.moving,
+        "as_fast_from_iteration": seeds.move_from,
+        **{name: _short(value) for name, value in late.items()},
+    }
+
+
+def _short(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)

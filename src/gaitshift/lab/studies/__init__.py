@@ -1,0 +1,6 @@
+"""Evidence on shifting: many robots, told with intervals."""
+
+from gaitshift.lab.studies.transitions import GROUNDS as GROUNDS
+from gaitshift.lab.studies.transitions import Outcomes as Outcomes
+from gaitshift.lab.studies.transitions import Pair as Pair
+from gaitshift.lab.studies.transitions import run_pair as run_pair

@@ -1,0 +1,154 @@
+"""Does the shift help? Robots cross noise in one gait, in the other, or shifted by a condition."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.control import Autonomous, Driver
+from gaitshift.control.policy import Policy
+from gaitshift.lab.evaluation.evaluate import grounds_of, starts
+from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.lab.gait_analysis import robot_mass
+from gaitshift.lab.identification import is_rough
+from gaitshift.lab.log import Log
+from gaitshift.lab.studies.batches import in_batches
+from gaitshift.robot.motion import GRAVITY, Motion
+from gaitshift.shift import Condition, GaitGraph, Oracle, load_condition
+from gaitshift.sim.world import World
+
+BEFORE, NOISE, AFTER = 4.0, 15.0, 5.0
+"""Metres of level ground, of noise, and of level ground again, from the start to the finish."""
+
+PATIENCE = 2.0
+"""Robots have this many times the time that they would need at the command."""
+
+BATCH = 256
+"""Robots at a time, over eight fields of noise."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """How robots choose their gait."""
+
+    name: str
+    """In words."""
+    start: str
+    """Gait at the start."""
+    graph: GaitGraph | None = None
+    """What they shift by; None: they keep their gait."""
+
+    @property
+    def gaits(self) -> tuple[str, ...]:
+        """All that may appear."""
+        return (self.start,) if self.graph is None else self.graph.gaits
+
+
+def ways(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Way, ...]:
+    """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
+    seen = Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0)
+    by = {name: load_condition(name) for name in conditions} | {"oracle": seen}
+    return (
+        Way(f"{flat} only", flat),
+        Way(f"{rough} only", rough),
+        *(
+            Way(name, flat, GaitGraph.of(condition, flat=flat, rough=rough))
+            for name, condition in by.items()
+        ),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Crossings:
+    """What came of N robots that were to cross."""
+
+    fell: Bool[np.ndarray, " N"]
+    """Whether the robot fell before the finish."""
+    arrived: Bool[np.ndarray, " N"]
+    """Whether it came to the finish in time."""
+    distance: Float[np.ndarray, " N"]
+    """How far it came along x, the finish at most [m]."""
+    speed: Float[np.ndarray, " N"]
+    """Distance over the time until the finish, the fall or the end [m/s]."""
+    cost_of_transport: Float[np.ndarray, " N"]
+    """Σ|τ q̇| over weight and distance; NaN for robots that came less than a metre."""
+    shifts: Int[np.ndarray, " N"]
+    """Changes of gait until then."""
+
+
+def cross(
+    policies: Mapping[str, Policy],
+    way: Way,
+    *,
+    amplitude: float,
+    runs: int,
+    seed: int,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> Crossings:
+    """Sends robots over noise of an amplitude [m], the same fields and starts for every way."""
+    return in_batches(
+        lambda n, seed: _batch(policies, way, amplitude, n, seed=seed),
+        runs,
+        most=BATCH,
+        seed=seed,
+        report=report,
+    )
+
+
+def _batch(
+    policies: Mapping[str, Policy], way: Way, amplitude: float, n: int, *, seed: int
+) -> Crossings:
+    rng = np.random.default_rng(seed)
+    way_to_go = BEFORE + NOISE + AFTER
+    slowest = min(policies[gait].info.forward_speed for gait in way.gaits)
+    seconds = PATIENCE * way_to_go / slowest
+    noise = f"perlin:{amplitude:g}@{NOISE:g}" if amplitude else f"flat@{NOISE:g}"
+    track = f"flat@{BEFORE + 2:g},{noise},flat@{2 * AFTER + 10:g}"
+    grounds = grounds_of(track, seed=seed, speed=0.0, seconds=seconds)
+    driver = Driver({gait: policies[gait] for gait in way.gaits}, n, start=way.start)
+    world = World(driver.robot, grounds, n, gains=driver.gains)
+    name, x0, length = grounds[0].name, grounds[0].origin[0], grounds[0].size[0]
+
+    def sees(motion: Motion) -> Bool[np.ndarray, " N"]:
+        return is_rough(motion.base_position_w[:, 0], name, x0, length)
+
+    start = starts(driver, rng)
+    log = rollout(
+        world,
+        driver,
+        RolloutConfig(seconds=seconds),
+        start_xy=start,
+        rng=rng,
+        switcher=None if way.graph is None else Autonomous(way.graph, n, sees=sees),
+        finish_x=float(start[:, 0].max()) + way_to_go,
+    )
+    return measure_crossings(log, way_to_go)
+
+
+def measure_crossings(log: Log, way_to_go: float) -> Crossings:
+    """What a log says of its robots, each on a way of this length from where it starts [m]."""
+    x = log.qpos[..., 0].astype(float) - log.qpos[0, :, 0]
+    over = ((x >= way_to_go) | log.fallen).cumsum(axis=0) > 0
+    # entries until the finish, the fall or the end, itself included
+    count = np.minimum((~over).sum(axis=0) + 1, len(x))
+    last, robots = count - 1, cast(Any, np.arange(x.shape[1]))
+    fell = log.fallen[last, robots]
+    arrived = ~fell & (x[last, robots] >= way_to_go)
+    distance = np.clip(x[last, robots], 0.0, way_to_go)
+    period = float(log.time[1] - log.time[0])
+    going = np.arange(len(x))[:, None] < count
+    power = np.abs(log.torque * log.qvel[..., 6:]).sum(axis=-1).astype(float)
+    work = (power * going).sum(axis=0) * period
+    weight = robot_mass(log.robot) * GRAVITY
+    far = distance >= 1.0
+    changed = (np.diff(log.gait, axis=0) != 0) & going[1:]
+    return Crossings(
+        fell=fell,
+        arrived=arrived,
+        distance=distance,
+        speed=distance / (count * period),
+        cost_of_transport=np.where(far, work / (weight * np.where(far, distance, 1.0)), np.nan),
+        shifts=changed.sum(axis=0),
+    )

@@ -1,0 +1,168 @@
+"""One gait swapped for another in an instant, at every phase of the stride: what comes of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.control import Controller, Decision, Driver
+from gaitshift.control.policy import Policy
+from gaitshift.lab.evaluation.evaluate import grounds_of, starts
+from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.lab.gait_analysis.base import forward_speed
+from gaitshift.lab.log import Log
+from gaitshift.lab.studies.batches import in_batches
+from gaitshift.robot.command import CONTROL_PERIOD, Command
+from gaitshift.robot.motion import Motion, rotation_of
+from gaitshift.sim.world import World
+
+GROUNDS = ("flat", "perlin:0.10")
+"""Specs of the grounds that shifts are tried on."""
+
+WARM_UP = 2.0
+"""Seconds in the old gait before the earliest shift; ours: it has settled by then."""
+
+WATCHED = 5.0
+"""Seconds in which a shift must come off."""
+
+REACHED = 0.5
+"""The new gait is reached when this share of a stride's steps, and of every later one's, shows a
+stance of its machine; ours, below the limit of a clean gait on flat ground, as noise takes some."""
+
+BATCH = 512
+"""Robots at a time: their log takes 130 MB."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A shift."""
+
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcomes:
+    """What came of N shifts."""
+
+    phase: Float[np.ndarray, " N"]
+    """Of the stride of FL in the old gait at the shift, from touchdown on [stride]."""
+    fell: Bool[np.ndarray, " N"]
+    """Whether the robot fell within `WATCHED` seconds."""
+    settle: Float[np.ndarray, " N"]
+    """Time until the new gait is reached for good [s]; NaN where it never is."""
+    dip: Float[np.ndarray, " N"]
+    """By how much the mean speed of a stride fell below the slower of the two commands [m/s]."""
+    tilt: Float[np.ndarray, " N"]
+    """Largest angle of the body from upright after the shift [rad]."""
+
+    @property
+    def success(self) -> Bool[np.ndarray, " N"]:
+        """No fall, and the new gait reached."""
+        return ~self.fell & ~np.isnan(self.settle)
+
+
+def run_pair(
+    policies: Mapping[str, Policy],
+    pair: Pair,
+    *,
+    ground: str,
+    switches: int,
+    seed: int,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> Outcomes:
+    """Shifts robots from one gait to the other, each at an instant of its own in the stride."""
+    return in_batches(
+        lambda n, seed: _run_batch(policies, pair, ground, n, seed=seed),
+        switches,
+        most=BATCH,
+        seed=seed,
+        report=report,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _AtSteps:
+    """Changes each robot's gait once, at a step of its own."""
+
+    step_of: Int[np.ndarray, " N"]
+    gait: str
+
+    def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:
+        """Changes those that are due in the control step that ends at `time`."""
+        now = round(time / CONTROL_PERIOD)
+        driver.switch(np.flatnonzero(self.step_of == now), self.gait, motion)
+        nothing = np.zeros(driver.n)
+        return Decision(k=nothing, threshold=nothing, foot_height=np.zeros((driver.n, 4)))
+
+
+def _run_batch(
+    policies: Mapping[str, Policy], pair: Pair, ground: str, n: int, *, seed: int
+) -> Outcomes:
+    rng = np.random.default_rng(seed)
+    old, new = policies[pair.old], policies[pair.new]
+    stride = round(1.0 / (old.info.stride_frequency * CONTROL_PERIOD))
+    at = round(WARM_UP / CONTROL_PERIOD) + rng.integers(0, stride, n)
+    seconds = WARM_UP + WATCHED + stride * CONTROL_PERIOD
+    fastest = max(old.info.forward_speed, new.info.forward_speed)
+    grounds = grounds_of(ground, seed=seed, speed=fastest, seconds=seconds)
+    driver = Driver({pair.old: old, pair.new: new}, n, start=pair.old)
+    world = World(driver.robot, grounds, n, gains=driver.gains)
+    log = rollout(
+        world,
+        driver,
+        RolloutConfig(seconds=seconds),
+        start_xy=starts(driver, rng),
+        rng=rng,
+        switcher=_AtSteps(at, pair.new),
+    )
+    return measure_shifts(log, at - 1, old, new)
+
+
+def measure_shifts(log: Log, at: Int[np.ndarray, " N"], old: Policy, new: Policy) -> Outcomes:
+    """Outcomes of a log in which each robot changed its gait in entry `at`."""
+    n = log.contact.shape[1]
+    watched = round(WATCHED / CONTROL_PERIOD)
+    # (watched, N); a log may end early, when all have fallen
+    entries: np.ndarray = np.minimum(at + 1 + np.arange(watched)[:, None], len(log.time) - 1)
+    robots = cast(Any, np.arange(n))
+    fallen: np.ndarray = log.fallen[entries, robots]
+    stride = round(1.0 / (new.info.stride_frequency * CONTROL_PERIOD))
+    shown = running_mean(log.stance_shown[entries, robots].astype(float), stride)
+    forward = forward_speed(log)[entries, robots].astype(float)
+    upright = rotation_of(log.qpos[entries, robots, 3:7].astype(float))[..., 2, 2]
+    slower = min(old.info.forward_speed, new.info.forward_speed)
+    return Outcomes(
+        phase=_phase(log.contact[..., 0], at, old),
+        fell=fallen[-1],
+        settle=_settled(shown >= REACHED, stride),
+        dip=np.maximum(slower - running_mean(forward, stride).min(axis=0), 0.0),
+        tilt=np.arccos(np.clip(upright, -1.0, 1.0)).max(axis=0),
+    )
+
+
+def running_mean(values: Float[np.ndarray, "T N"], window: int) -> Float[np.ndarray, "S N"]:
+    """Means over each `window` entries in a row; entry s is over s to s + window − 1."""
+    total = np.concatenate([np.zeros((1, values.shape[1])), values.cumsum(axis=0)])
+    return (total[window:] - total[:-window]) / window
+
+
+def _settled(reached: Bool[np.ndarray, "S N"], stride: int) -> Float[np.ndarray, " N"]:
+    """End of the first stride from which on the gait is reached in all [s]; NaN if in none."""
+    lost = ~reached
+    last = len(reached) - lost[::-1].argmax(axis=0)  # the entry after the last that is not reached
+    first = np.where(lost.any(axis=0), last, 0)
+    return np.where(first < len(reached), (first + stride) * CONTROL_PERIOD, np.nan)
+
+
+def _phase(
+    contact: Bool[np.ndarray, "T N"], at: Int[np.ndarray, " N"], old: Policy
+) -> Float[np.ndarray, " N"]:
+    """Part of a stride since the last touchdown of FL before `at`."""
+    lands = contact & ~np.concatenate([contact[:1], contact[:-1]])
+    steps = np.where(lands, np.arange(len(contact))[:, None], -1)
+    last = np.maximum.accumulate(steps, axis=0)[at, np.arange(len(at))]
+    stride = 1.0 / (old.info.stride_frequency * CONTROL_PERIOD)
+    return ((at - last) / stride) % 1.0

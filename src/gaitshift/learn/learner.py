@@ -1,0 +1,211 @@
+"""rsl_rl's PPO on a `GaitEnv`: one object that collects and learns an iteration at a time."""
+
+from itertools import chain
+from math import isfinite
+from typing import Any, cast
+
+import numpy as np
+import torch
+from rsl_rl.algorithms import PPO
+from rsl_rl.models import MLPModel
+from rsl_rl.storage import RolloutStorage
+from tensordict import TensorDict
+
+from gaitshift.control.observation import JOINT_MIRROR
+from gaitshift.errors import GaitshiftError
+from gaitshift.learn.recipe import Recipe
+from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.sim.env import GaitEnv
+
+_GROUPS = {"actor": ["policy"], "critic": ["policy"]}
+"""Actor and critic see the same observation (paper IV-A)."""
+
+
+def as_tensors(observation: np.ndarray) -> TensorDict:
+    """An observation as rsl_rl wants it."""
+    return TensorDict({"policy": torch.from_numpy(observation)}, batch_size=[len(observation)])
+
+
+class DivergedError(GaitshiftError):
+    """A training broke down in its own numbers: they are no longer finite."""
+
+
+class Learner:
+    """Actor, critic and PPO for one environment."""
+
+    def __init__(self, env: GaitEnv, recipe: Recipe) -> None:
+        self.env = env
+        self.recipe = recipe
+        self._observation = as_tensors(env.reset()[0])
+        self.ppo = _build_ppo(env, recipe, self._observation)
+        self.totals: dict[str, float] = {}
+
+    def start_episodes(self, seed: int) -> None:
+        """Starts all robots anew from a seed, with the ages of their episodes spread out."""
+        observation, _ = self.env.reset(seed=seed)
+        self.env.spread_ages()
+        self._observation = as_tensors(observation)
+
+    def iterate(self) -> dict[str, float]:
+        """Collects one batch, learns from it, and tells what it saw.
+
+        Raises:
+            DivergedError: weights, actions or figures are not finite.
+        """
+        try:
+            seen = self._collect_and_update()
+        except (ArithmeticError, RuntimeError, ValueError):
+            self._check_weights()  # torch's own complaint about them is not as plain
+            raise
+        self._check_weights()
+        for name, value in seen.items():
+            if not isfinite(value):
+                raise DivergedError(f"the training broke down: {name} is {value}")
+        return seen
+
+    def _collect_and_update(self) -> dict[str, float]:
+        self.ppo.train_mode()
+        statistics = _Statistics()
+        with torch.inference_mode():
+            for _ in range(self.recipe.steps):
+                self._collect(statistics)
+            self.ppo.compute_returns(self._observation)
+        losses = self.ppo.update()
+        return {
+            **statistics.means(),
+            "value_loss": losses["value"],
+            "action_std": float(self.ppo.actor.output_std.detach().mean()),
+            "learning_rate": self.ppo.learning_rate,
+        }
+
+    def aim(
+        self, *, desired_kl: float, entropy: float, horizon: float = 1.0, trace: float = 1.0
+    ) -> None:
+        """Sets factors on what updates aim at, the entropy bonus, 1 / (1 - γ) and 1 / (1 - λ)."""
+        config = self.recipe.ppo
+        self.ppo.desired_kl = desired_kl * config.desired_kl
+        self.ppo.entropy_coef = entropy * config.entropy
+        self.ppo.gamma = 1.0 - (1.0 - config.discount) / horizon
+        self.ppo.lam = 1.0 - (1.0 - config.gae_lambda) / trace
+
+    def _check_weights(self) -> None:
+        for network, model in (("actor", self.ppo.actor), ("critic", self.ppo.critic)):
+            for name, weights in model.named_parameters():
+                if not weights.isfinite().all():
+                    raise DivergedError(
+                        f"the training broke down: {name} of the {network} is not finite"
+                    )
+
+    def _collect(self, statistics: "_Statistics") -> None:
+        ppo, scale = self.ppo, self.recipe.ppo.reward_scale
+        action = ppo.act(self._observation)
+        if action.isnan().any():
+            raise DivergedError("the training broke down: an action is not a number")
+        observation, reward, terminated, truncated, info = self.env.step(action.numpy())
+        statistics.add(reward, terminated, truncated, info)
+        rewards = torch.from_numpy(scale * reward).float()
+        if truncated.any():
+            # A cut episode goes on in truth: its last step is worth what its true end was worth.
+            final = as_tensors(info["final_obs"][truncated])
+            rewards[torch.from_numpy(truncated)] += ppo.gamma * ppo.critic(final).squeeze(1)
+        self._observation = as_tensors(observation)
+        done = torch.from_numpy(terminated | truncated)
+        ppo.process_env_step(self._observation, rewards, done, {})
+
+
+class _Statistics:
+    """Means over an iteration of what the environment says each step."""
+
+    def __init__(self) -> None:
+        self._sums: dict[str, float] = {}
+        self._steps = 0
+
+    def add(
+        self,
+        reward: np.ndarray,
+        terminated: np.ndarray,
+        truncated: np.ndarray,
+        info: dict[str, Any],
+    ) -> None:
+        """Takes in one step of all robots."""
+        seen = {
+            "reward": reward,
+            "reward/bonus": info["bonus"],
+            "speed": info["forward_speed"],
+            "falls": terminated,
+            "changes_per_s": info["changed"] / CONTROL_PERIOD,
+            "stance_fraction": info["shows_stance"],
+            **{f"reward/{name}": term for name, term in info["reward_terms"].items()},
+        }
+        for name, value in seen.items():
+            self._sums[name] = self._sums.get(name, 0.0) + float(np.mean(value))
+        self._steps += 1
+
+    def means(self) -> dict[str, float]:
+        """Mean of each quantity.
+
+        `survival` is the chance to last 10 s at the present rate of falls.
+        """
+        means = {name: total / self._steps for name, total in self._sums.items()}
+        means["survival"] = float((1.0 - means.pop("falls")) ** 1000)
+        return means
+
+
+def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
+    config = recipe.ppo
+    network: dict[str, Any] = {
+        "hidden_dims": config.hidden,
+        "activation": "lrelu",
+        "obs_normalization": config.normalize_observations,
+    }
+    distribution: dict[str, Any] = {
+        "class_name": "GaussianDistribution",
+        "init_std": config.initial_std,
+        "std_range": (0.05, 2.0),
+    }
+    actor = MLPModel(observation, _GROUPS, "actor", 12, **network, distribution_cfg=distribution)
+    with torch.no_grad():  # the first actions are then nearly the stance
+        cast(torch.nn.Linear, actor.mlp[-1]).weight.mul_(config.output_gain)
+    critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
+    storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
+    symmetric = config.mirror and env.machine.mirrored_states() is not None
+    ppo = PPO(
+        actor,
+        critic,
+        storage,
+        num_learning_epochs=config.epochs,
+        num_mini_batches=config.mini_batches,
+        clip_param=config.clip,
+        gamma=config.discount,
+        lam=config.gae_lambda,
+        entropy_coef=config.entropy,
+        use_clipped_value_loss=config.clip_values,
+        learning_rate=config.learning_rate,
+        schedule="adaptive" if config.desired_kl > 0 else "fixed",
+        desired_kl=config.desired_kl,
+        symmetry_cfg=_symmetry(env) if symmetric else None,
+    )
+    if config.fused_adam:
+        weights = chain(actor.parameters(), critic.parameters())
+        ppo.optimizer = torch.optim.Adam(weights, lr=config.learning_rate, fused=True)
+    return ppo
+
+
+def _symmetry(env: GaitEnv) -> dict[str, Any]:
+    """rsl_rl's augmentation: each batch followed by its mirror image."""
+    order, signs = (torch.from_numpy(part) for part in env.observe.mirror)
+    joint_order = torch.tensor(JOINT_MIRROR[0])
+    joint_signs = torch.tensor(JOINT_MIRROR[1], dtype=torch.float32)
+
+    def augment(
+        env: Any, obs: TensorDict | None, actions: torch.Tensor | None
+    ) -> tuple[TensorDict | None, torch.Tensor | None]:
+        if obs is not None:
+            seen = obs["policy"]
+            both = torch.cat([seen, signs * seen[:, order]])
+            obs = TensorDict({"policy": both}, batch_size=[len(both)])
+        if actions is not None:
+            actions = torch.cat([actions, joint_signs * actions[:, joint_order]])
+        return obs, actions
+
+    return {"env": None, "data_augmentation_func": augment, "use_data_augmentation": True}

@@ -1,0 +1,289 @@
+"""The recipe: everything that decides what a training run does, as data."""
+
+from dataclasses import dataclass, field, replace
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.sim.env import EnvConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class PpoConfig:
+    """Hyperparameters of PPO (Schulman et al. 2017), in rsl_rl's terms."""
+
+    hidden: tuple[int, ...] = (256, 128, 32)
+    """Hidden layers of actor and critic, each followed by a leaky ReLU (paper IV-A)."""
+    epochs: int = 5
+    """Passes over each batch; rsl_rl's default."""
+    mini_batches: int = 4
+    """Mini-batches a pass; rsl_rl's default."""
+    discount: float = 0.99
+    """γ; 1 s at 100 Hz."""
+    gae_lambda: float = 0.95
+    """λ of generalised advantage estimation."""
+    clip: float = 0.2
+    """Clipping of the probability ratio."""
+    clip_values: bool = False
+    """Whether the value loss is clipped too; ours: no, since values are far larger than `clip`."""
+    learning_rate: float = 1e-3
+    """First learning rate; it follows `desired_kl` from there."""
+    desired_kl: float = 0.01
+    """KL divergence an update aims at."""
+    entropy: float = 0.003
+    """Weight of the entropy bonus; ours."""
+    initial_std: float = 0.5
+    """First standard deviation of the actions; ours."""
+    output_gain: float = 0.01
+    """Factor on the actor's last weights at the start; Andrychowicz et al. 2021."""
+    reward_scale: float = 0.02
+    """Rewards are scaled by this inside PPO alone; ours: values near 1 to 100 with b = 200."""
+    normalize_observations: bool = True
+    """Running mean and variance of the observations in front of both networks."""
+    mirror: bool = True
+    """Every batch is doubled by its mirror image (left and right changed), where the machine is
+    symmetric; ours, after Mittal et al. 2024."""
+    fused_adam: bool = False
+    """Whether Adam's arithmetic is one kernel: a sixth less time where mini-batches are small and
+    many, and other last digits."""
+
+
+FIELD_KINDS = ("flat", "perlin", "slope", "stair", "step")
+"""Kinds of fields that a rough stage may have."""
+
+
+def _shared_out(**fields: int) -> tuple[str, ...]:
+    return tuple(kind for kind, count in fields.items() for _ in range(count))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """A stretch of training on one kind of ground."""
+
+    name: str
+    """Shown in the progress and written into `progress.csv`."""
+    iterations: int
+    """PPO iterations."""
+    amplitude: float = 0.0
+    """Largest |height| of the Perlin grounds at the end of the stage [m]."""
+    slope: float = 0.0
+    """Steepest slope at the end of the stage, in any direction [degrees]."""
+    stair: float = 0.0
+    """Highest stairs at the end of the stage [m]."""
+    step: float = 0.0
+    """Highest single steps at the end of the stage [m]."""
+    redraw_every: int = 5
+    """Iterations between two draws of the ground (paper III-D)."""
+    push: float = 0.0
+    """Largest push on the base [N]."""
+    mixed_starts: float = 0.0
+    """Share of the episodes that begin in the midst of a stride that is no gait's, as after a shift
+    from another gait (`GaitEnv.mixed_starts`); ours, the paper trains nothing for shifts."""
+    swing_factor: float = 1.0
+    """Factor on the swing heights that the gait asks for; ours: feet that swing 14 cm high, where
+    10 cm is enough on level ground, do not catch on steps."""
+    kl_factor: float = 1.0
+    """Factor on PPO's `desired_kl`; ours: on rough ground larger steps come further."""
+    horizon_factor: float = 1.0
+    """Factor on PPO's horizon, 1 / (1 - γ) steps; ours: a foot that is caught on an edge brings the
+    robot down 1 to 3 s later, which a horizon of 1 s hardly sees."""
+    trace_factor: float = 1.0
+    """Factor on 1 / (1 - λ) steps, how far back PPO lays what happens to an action's account;
+    ours: with λ = 0.98 robots keep their feet on edges that fell with 0.95, but their steps are
+    less clean, which a last stage with 0.95 mends."""
+    fields: tuple[str, ...] = _shared_out(flat=3, perlin=2, slope=1, stair=3, step=3)
+    """Kinds of the fields that robots share out at a time on rough ground; ours: level ground
+    stays among them, or speeds and touchdowns that were learned on it get lost. With one field of
+    stairs and one of steps in nine, 8 of 64 bounding robots stayed up over steps of 10 cm; with
+    these, 64."""
+    settle: float = 0.35
+    """Last share of the stage, if the run ends with it, in which the policy settles: `desired_kl`
+    and `entropy` fall to a tenth; ours: without it the speed of the last policy is off by up to
+    0.2 m/s, now to this side, now to that."""
+    averaged: float = 0.24
+    """Last share of the stage, if the run ends with it, whose checkpoints' actors are averaged into
+    the policy; ours: what a policy does on edges and how fast it walks goes up and down from one to
+    the next, and their mean is better than most of them (Izmailov et al. 2018). 0: the last actor
+    alone."""
+
+    def __post_init__(self) -> None:
+        for name in ("settle", "averaged"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise GaitshiftError(f"{name} = {getattr(self, name)}: 0 to 1 would be right")
+        for name in ("kl_factor", "horizon_factor", "trace_factor"):
+            if not getattr(self, name) > 0.0:
+                raise GaitshiftError(f"{name} = {getattr(self, name)}: more than 0 would be right")
+        unknown = [kind for kind in self.fields if kind not in FIELD_KINDS]
+        if unknown or not self.fields:
+            raise GaitshiftError(f"fields {unknown}: some of {', '.join(FIELD_KINDS)} are right")
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether any of its ground is not flat."""
+        return max(self.amplitude, self.slope, self.stair, self.step) > 0
+
+
+_ROUGH = Stage(
+    name="rough",
+    iterations=470,
+    amplitude=0.16,
+    slope=12.0,
+    stair=0.08,
+    step=0.15,
+    push=130.0,
+    swing_factor=1.4,
+    kl_factor=2.0,
+    horizon_factor=2.0,
+    trace_factor=2.5,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """A training run: the same one for every gait."""
+
+    env: EnvConfig = field(default_factory=EnvConfig)
+    """The environment."""
+    ppo: PpoConfig = field(default_factory=PpoConfig)
+    """The algorithm."""
+    stages: tuple[Stage, ...] = (
+        Stage(name="flat", iterations=450),
+        _ROUGH,
+        replace(
+            _ROUGH,
+            name="polish",
+            iterations=300,
+            trace_factor=1.0,
+            fields=_shared_out(flat=5, perlin=2, slope=1, stair=2, step=2),
+            settle=1.0,
+            averaged=0.5,
+        ),
+    )
+    """Flat ground, then Perlin ground with pushes (paper III-D), in two stages: sturdy, then clean
+    again."""
+    robots: int = 128
+    """Robots in parallel; ours: a core's worth of physics a step (the paper has 30)."""
+    steps: int = 24
+    """Control steps of each robot in an iteration; ours (the paper has 100)."""
+    strict_from: int = 60
+    """Iteration from which the environment's strictness grows from 0; ours: asked for in full from
+    the start, swing heights and the price of chatter hide the cycle from exploration."""
+    strict_until: int = 210
+    """Iteration at which it has grown."""
+    strict_share: float = 1.0
+    """Strictness then; 0: none ever, as in the paper."""
+    command_from: int = 100
+    """Iteration from which commands spread from the gait's own; ours: first the gait, then its
+    speeds and frequencies."""
+    command_until: int = 300
+    """Iteration at which commands are drawn from all of the gait's ranges."""
+    penalty_start: float = 1.0
+    """The factor λ on all penalties at the first iteration; 1: no curriculum (paper III-D)."""
+    penalty_until: int = 200
+    """Iteration at which λ has grown to 1, by the same step each iteration."""
+    checkpoint_every: int = 50
+    """Iterations between two checkpoints."""
+    threads: int = 2
+    """Threads of torch."""
+    physics_threads: int = 0
+    """Threads of the physics; 0: one a core."""
+
+    def __post_init__(self) -> None:
+        for name, low, high in (
+            ("robots", 1, 65536),
+            ("steps", 1, 100_000),
+            ("checkpoint_every", 1, 1_000_000),
+            ("threads", 1, 1024),
+            ("physics_threads", 0, 1024),
+            ("penalty_start", 0.0, 1.0),
+            ("penalty_until", 1, 1_000_000),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise GaitshiftError(f"{name} = {value}: {low} to {high} would be right")
+        for name in ("strict", "command"):
+            if not 0 <= getattr(self, f"{name}_from") < getattr(self, f"{name}_until"):
+                raise GaitshiftError(f"{name}_from must be 0 or more and lie before {name}_until")
+        if any(stage.iterations < 0 for stage in self.stages) or self.iterations < 1:
+            raise GaitshiftError("iterations: at least 1 would be right")
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of all stages together."""
+        return sum(stage.iterations for stage in self.stages)
+
+    def with_iterations(self, iterations: int) -> "Recipe":
+        """The same recipe cut, or its last stage drawn out, to this number of iterations."""
+        if iterations < 1:
+            raise GaitshiftError(f"{iterations} iterations: at least 1 would be right")
+        stages: list[Stage] = []
+        left = iterations
+        for index, stage in enumerate(self.stages, start=1):
+            take = left if index == len(self.stages) else min(stage.iterations, left)
+            stages.append(replace(stage, iterations=take))
+            left -= take
+        return replace(self, stages=tuple(s for s in stages if s.iterations > 0))
+
+    def strictness(self, iteration: int) -> float:
+        """The environment's strictness at this iteration."""
+        return self.strict_share * _grown(iteration, self.strict_from, self.strict_until)
+
+    def command_scale(self, iteration: int) -> float:
+        """Share of the gait's ranges that commands are drawn from at this iteration."""
+        return _grown(iteration, self.command_from, self.command_until)
+
+    def penalty_scale(self, iteration: int) -> float:
+        """The factor λ on all penalties at this iteration (paper III-D)."""
+        first = self.penalty_start
+        return first + (1.0 - first) * _grown(iteration, 0, self.penalty_until)
+
+    def settling(self, iteration: int) -> float:
+        """The factor on `desired_kl` and `entropy` at this iteration."""
+        last = self.stages[-1]
+        if last.settle == 0:
+            return 1.0
+        start = self.iterations - last.settle * last.iterations
+        return 1.0 - 0.9 * _grown(iteration, start, self.iterations)
+
+    def is_averaged(self, iteration: int) -> bool:
+        """Whether the actor of a checkpoint at this iteration is averaged into the policy."""
+        last = self.stages[-1]
+        return last.averaged > 0 and iteration >= self.iterations - last.averaged * last.iterations
+
+    @classmethod
+    def paper(cls) -> "Recipe":
+        """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
+
+        PPO has these defaults of stable-baselines3, the library that the paper names: 10 epochs,
+        mini-batches of 64 (63 here, as 47 parts of 3000), learning rate 3e-4 without adaptation,
+        γ, λ, clipping, no entropy bonus, no normalisation of observations. rsl_rl's own stand in
+        the weight of the value loss (1, there 0.5), the largest norm of gradients (1 for each
+        network, there 0.5 for both), the normalisation of advantages (over the batch, there over
+        each mini-batch) and Adam's ε (1e-8, there 1e-5).
+        """
+        return cls(
+            env=EnvConfig.paper(),
+            ppo=PpoConfig(
+                epochs=10,
+                mini_batches=47,
+                learning_rate=3e-4,
+                desired_kl=0.0,
+                entropy=0.0,
+                initial_std=1.0,
+                reward_scale=1.0,
+                normalize_observations=False,
+                mirror=False,
+                fused_adam=True,
+            ),
+            stages=(Stage(name="flat", iterations=500, settle=0.0, averaged=0.0),),
+            robots=30,
+            steps=100,
+            strict_share=0.0,
+        )
+
+
+def _grown(iteration: int, start: float, end: float) -> float:
+    """0 until `start`, 1 from `end` on, and a straight line in between."""
+    return min(max((iteration - start) / (end - start), 0.0), 1.0)
+
+
+PRESETS = {"default": Recipe, "paper": Recipe.paper}
+"""Recipes by the name that `gaitshift train --preset` takes."""

@@ -1,0 +1,308 @@
+"""A training run: its folder, its loop, and how it goes on after it was killed."""
+
+import json
+import platform
+import shutil
+import time
+from collections.abc import Callable
+from copy import deepcopy
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import cattrs
+import numpy as np
+import torch
+from torch.utils.tensorboard import SummaryWriter
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine
+from gaitshift.learn.export import describe, export
+from gaitshift.learn.ground import FIELD, draw_grounds, stage_at
+from gaitshift.learn.learner import Learner
+from gaitshift.learn.lines import Row, append, last, trim
+from gaitshift.learn.recipe import Recipe
+from gaitshift.robot.description import ANYMAL_B, Robot
+from gaitshift.robot.robot_file import from_dict, to_dict, use_robot
+from gaitshift.sim.env import GaitEnv
+from gaitshift.sim.terrain import flat
+
+CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
+PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
+
+_STRICT = cattrs.Converter(forbid_extra_keys=True)
+
+Judge = Callable[[Path], Row]
+"""Looks at a policy file and gives its verdict, a line of `verdicts.csv`."""
+
+
+class Run:
+    """One gait, one recipe, one seed, one folder.
+
+    A checkpoint is taken every `recipe.checkpoint_every` iterations. At each of them, in a run that
+    was never broken as in one that goes on from there, all robots start anew from a seed made of
+    the run's seed and the iteration: so both give the same weights, bit for bit.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        machine: RewardMachine,
+        recipe: Recipe,
+        seed: int,
+        command: str,
+        robot: Robot = ANYMAL_B,
+    ) -> None:
+        self.folder = folder
+        self.machine = machine
+        self.recipe = recipe
+        self.seed = seed
+        self.command = command
+        self.iteration = 0
+        self._wall = 0.0
+        torch.set_num_threads(recipe.threads)
+        torch.manual_seed(seed)
+        env = GaitEnv(
+            machine,
+            flat(FIELD, FIELD),
+            recipe.robots,
+            config=recipe.env,
+            robot=robot,
+            threads=recipe.physics_threads,
+        )
+        self.learner = Learner(env, recipe)
+
+    @classmethod
+    def create(
+        cls,
+        folder: Path,
+        machine: RewardMachine,
+        recipe: Recipe,
+        *,
+        seed: int,
+        command: str,
+        robot: Robot = ANYMAL_B,
+        overwrite: bool = False,
+    ) -> "Run":
+        """A new run in a new folder."""
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            if not overwrite:
+                raise GaitshiftError(
+                    f"{folder} exists and is not empty; give another --out, --overwrite, "
+                    f"or --resume {folder}"
+                )
+            _clear(folder)
+        folder.mkdir(parents=True, exist_ok=True)  # first, since where it fails nothing else helps
+        run = cls(folder, machine, recipe, seed, command, robot)
+        config = {
+            "command": command,
+            "seed": seed,
+            "machine": machine.to_dict(),
+            "recipe": asdict(recipe),
+            "versions": _versions(),
+        }
+        if robot != ANYMAL_B:
+            config["robot"] = to_dict(robot)
+        # First of all, so that a folder left half made by a kill still shows what it is.
+        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
+        (folder / CHECKPOINTS).mkdir(exist_ok=True)
+        run._save_checkpoint()
+        return run
+
+    @classmethod
+    def resume(cls, folder: Path) -> "Run":
+        """The run of a folder, as it was at its last checkpoint."""
+        try:
+            config = json.loads((folder / CONFIG).read_text())
+            machine = RewardMachine.from_dict(config["machine"])
+            recipe = _STRICT.structure(config["recipe"], Recipe)
+            robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
+            use_robot(robot)
+            run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
+        except (FileNotFoundError, NotADirectoryError) as error:
+            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
+        except cattrs.BaseValidationError as error:
+            faults = "; ".join(cattrs.transform_error(error))
+            raise GaitshiftError(f"{folder / CONFIG} is damaged: {faults}") from error
+        except GaitshiftError as error:
+            raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
+        checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
+        if not checkpoints:
+            raise GaitshiftError(f"{folder / CHECKPOINTS} holds no checkpoint to go on from")
+        run._load_checkpoint(checkpoints[-1])
+        return run
+
+    def train(
+        self, report: Callable[[Row], None] = lambda row: None, judge: Judge | None = None
+    ) -> Path:
+        """Runs to the end, calling `report` after each iteration; gives the policy's path.
+
+        At each checkpoint the policy is written out for `judge`, and its verdict written down;
+        first of all that of the present one, if a kill left it out.
+        Interrupted by Ctrl-C it leaves the last checkpoint, and the policy as it stands.
+        """
+        writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
+        for name in (PROGRESS, VERDICTS):
+            trim(self.folder / name, self.iteration)
+        try:
+            if judge is not None and self._lacks_verdict():
+                self._write_verdict(judge)
+            while self.iteration < self.recipe.iterations:
+                row = self.iterate()
+                self._log(row, writer)
+                report(row)
+                if self._is_checkpoint():
+                    self._save_checkpoint()
+                    if judge is not None:
+                        self._write_verdict(judge)
+        finally:
+            writer.close()
+            self.export()
+        return self.folder / POLICY
+
+    def write_policy_at(self, iteration: int, path: Path) -> None:
+        """Writes the policy as it stood at a checkpoint; the run itself stands there then.
+
+        Raises:
+            GaitshiftError: no such checkpoint, or a damaged one.
+        """
+        self._load_checkpoint(self.folder / CHECKPOINTS / f"{iteration:06d}.pt")
+        self.export(path)
+
+    def export(self, path: Path | None = None) -> None:
+        """Writes the present policy, into the run's folder if no path is given."""
+        training = {
+            "command": self.command,
+            "seed": self.seed,
+            "iterations": self.iteration,
+            "steps": self._steps(),
+            "versions": _versions(),
+        }
+        info = describe(self.learner.env, training)
+        ppo = self.learner.ppo
+        export(ppo.actor, info, path or self.folder / POLICY, self._averaged(), ppo.critic)
+
+    def _averaged(self) -> torch.nn.Sequential:
+        """The present actor's layers, their weights averaged with those of the last checkpoints."""
+        layers = deepcopy(self.learner.ppo.actor.mlp)
+        total = {name: weights.clone() for name, weights in layers.state_dict().items()}
+        count = 1
+        for path in sorted((self.folder / CHECKPOINTS).glob("*.pt")):
+            earlier = int(path.stem)
+            if earlier < self.iteration and self.recipe.is_averaged(earlier):
+                state = _read_checkpoint(path)["ppo"]["actor_state_dict"]
+                for name, weights in total.items():
+                    weights += state[f"mlp.{name}"]
+                count += 1
+        layers.load_state_dict({name: weights / count for name, weights in total.items()})
+        return layers
+
+    def iterate(self) -> Row:
+        """One iteration, on the ground of its stage; gives the line that `train` writes down."""
+        start = time.perf_counter()
+        stage, within = stage_at(self.recipe, self.iteration)
+        env = self.learner.env
+        if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
+            env.set_terrain(draw_grounds(stage, within, self.seed))
+            env.push_at_most(stage.push)
+        env.swing_factor, env.mixed_starts = stage.swing_factor, stage.mixed_starts
+        env.strictness = self.recipe.strictness(self.iteration)
+        env.command_scale = self.recipe.command_scale(self.iteration)
+        env.penalty_scale = self.recipe.penalty_scale(self.iteration)
+        settling = self.recipe.settling(self.iteration)
+        self.learner.aim(
+            desired_kl=stage.kl_factor * settling,
+            entropy=settling,
+            horizon=stage.horizon_factor,
+            trace=stage.trace_factor,
+        )
+        if self._is_checkpoint():
+            self.learner.start_episodes(_seed_at(self.seed, self.iteration))
+        seen = self.learner.iterate()
+        self.iteration += 1
+        self._wall += time.perf_counter() - start
+        return {
+            "iteration": self.iteration,
+            "stage": stage.name,
+            "steps": self._steps(),
+            "wall_s": round(self._wall, 3),
+            **{name: float(f"{value:.6g}") for name, value in seen.items()},
+        }
+
+    def _steps(self) -> int:
+        return self.iteration * self.recipe.robots * self.recipe.steps
+
+    def _is_checkpoint(self) -> bool:
+        last = self.iteration == self.recipe.iterations
+        return last or self.iteration % self.recipe.checkpoint_every == 0
+
+    def _save_checkpoint(self) -> None:
+        path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
+        part = path.with_suffix(".part")
+        state: dict[str, Any] = {
+            "iteration": self.iteration,
+            "wall_s": self._wall,
+            "torch_rng": torch.get_rng_state(),
+            "ppo": self.learner.ppo.save(),
+        }
+        torch.save(state, part)
+        part.replace(path)
+
+    def _load_checkpoint(self, path: Path) -> None:
+        state = _read_checkpoint(path)
+        self.iteration = state["iteration"]
+        self._wall = state["wall_s"]
+        try:
+            self.learner.ppo.load(state["ppo"], None, True)
+        except (KeyError, RuntimeError, ValueError) as error:
+            why = " ".join(str(error).split())
+            raise GaitshiftError(f"{path} does not fit {self.folder / CONFIG}: {why}") from error
+        torch.set_rng_state(state["torch_rng"])
+        stage, within = stage_at(self.recipe, self.iteration)
+        drawn = within - within % stage.redraw_every
+        self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed))
+        self.learner.env.push_at_most(stage.push)
+
+    def _log(self, row: Row, writer: SummaryWriter) -> None:
+        append(self.folder / PROGRESS, row)
+        for name, value in row.items():
+            if name not in ("iteration", "stage"):
+                writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
+
+    def _lacks_verdict(self) -> bool:
+        if self.iteration == 0 or not self._is_checkpoint():
+            return False
+        return last(self.folder / VERDICTS, self.iteration).get("iteration") != self.iteration
+
+    def _write_verdict(self, judge: Judge) -> None:
+        self.export()
+        verdict = judge(self.folder / POLICY)
+        append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
+
+
+def _read_checkpoint(path: Path) -> dict[str, Any]:
+    try:
+        return torch.load(path, weights_only=True)
+    except Exception as error:  # torch has no common class for a damaged file
+        raise GaitshiftError(
+            f"{path} is damaged; remove it to go on from the one before"
+        ) from error
+
+
+def _seed_at(seed: int, iteration: int) -> int:
+    return int(np.random.SeedSequence((seed, iteration)).generate_state(1)[0])
+
+
+def _versions() -> dict[str, str]:
+    packages = ("gaitshift", "mujoco-core", "numpy", "torch", "rsl-rl-lib", "gymnasium")
+    return {"python": platform.python_version(), **{name: version(name) for name in packages}}
+
+
+def _clear(folder: Path) -> None:
+    """Empties the folder of an earlier run; anything else in it is not ours to delete."""
+    if not (folder / CONFIG).is_file():
+        raise GaitshiftError(f"{folder} is not a training run, so it is not overwritten")
+    shutil.rmtree(folder)

@@ -1,5 +1,0 @@
-"""One self-contained page of a run, a training or a study, that opens from disk."""
-
-from gaitshift.report.log_page import MOST_VIDEO as MOST_VIDEO
-from gaitshift.report.log_page import write_report as write_report
-from gaitshift.report.training_page import write_training_report as write_training_report

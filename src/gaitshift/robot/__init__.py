@@ -1,0 +1,11 @@
+"""The robot: its legs, its description, what is measured of it and what it is asked to do."""
+
+from gaitshift.robot.command import Command as Command
+from gaitshift.robot.command import HeadingLoop as HeadingLoop
+from gaitshift.robot.command import SpeedLoop as SpeedLoop
+from gaitshift.robot.description import ANYMAL_B as ANYMAL_B
+from gaitshift.robot.description import Gains as Gains
+from gaitshift.robot.description import Robot as Robot
+from gaitshift.robot.legs import JOINTS as JOINTS
+from gaitshift.robot.legs import LEGS as LEGS
+from gaitshift.robot.motion import Motion as Motion

@@ -1,0 +1,118 @@
+"""A robot: its model, the names of its feet and joints, its stance, its gains.
+
+Another quadruped is another `Robot` value: its MJCF needs a free joint, twelve position-controlled
+joints in the order legs × (HAA, HFE, KFE), and per leg the sensors this module names.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.robot.legs import JOINTS, LEGS
+
+if TYPE_CHECKING:
+    import mujoco
+
+_MODELS = Path(__file__).parent / "models"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """Gains of the joint controllers: torque = kp · (target - q) - kd · q̇."""
+
+    kp: float
+    """[N·m/rad]"""
+    kd: float
+    """[N·m·s/rad]"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robot:
+    """What the rest of the package needs to know of a quadruped."""
+
+    name: str
+    """Stands in policy files; a policy of another robot is refused."""
+    model_file: Path
+    """The robot's MJCF, without any ground."""
+    stance: tuple[float, ...]
+    """Joint angles of the default stance, the paper's q_init (12 values) [rad]."""
+    stance_height: float
+    """Height of the base origin above level ground in that stance, feet just touching [m]."""
+    foot_radius: float
+    """[m]"""
+    effort_limit: float
+    """Largest torque of a joint [N·m]."""
+    velocity_limit: float
+    """Largest speed of a joint [rad/s]; not enforced by the simulation, but reported."""
+    action_scale: float
+    """Joint target = stance + action_scale · action [rad]."""
+    gains: dict[str, Gains] = field(default_factory=dict[str, Gains])
+    """Presets by name; `default` must be there."""
+
+    def __post_init__(self) -> None:
+        if len(self.stance) != 12:
+            raise GaitshiftError(f"robot {self.name}: a stance has 12 joint angles")
+        if "default" not in self.gains:
+            raise GaitshiftError(f"robot {self.name}: gains need a preset named 'default'")
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The twelve joints, in the order of every joint axis of the package."""
+        return tuple(f"{leg}_{joint}" for leg in LEGS for joint in JOINTS)
+
+    @property
+    def stance_angles(self) -> Float[np.ndarray, " 12"]:
+        """`stance` as an array [rad]."""
+        return np.array(self.stance)
+
+    def gains_of(self, preset: str) -> Gains:
+        """The gains of a preset, or an error that lists the presets."""
+        if preset not in self.gains:
+            known = ", ".join(self.gains)
+            raise GaitshiftError(f"robot {self.name} has no gains '{preset}'; known: {known}")
+        return self.gains[preset]
+
+    def spec(self, gains: Gains) -> "mujoco.MjSpec":
+        """The robot's model with these gains in its joint controllers, ready for a ground.
+
+        MuJoCo is asked for here alone: a robot that runs policies needs no simulator.
+        """
+        import mujoco
+
+        spec = mujoco.MjSpec.from_file(str(self.model_file))
+        for actuator in cast("list[mujoco.MjsActuator]", spec.actuators):
+            actuator.gainprm[0] = gains.kp
+            actuator.biasprm[1:3] = (-gains.kp, -gains.kd)
+        return spec
+
+
+_HAA, _HFE, _KFE = 0.03, 0.4, 0.8
+
+ANYMAL_B = Robot(
+    name="anymal_b",
+    model_file=_MODELS / "anymal_b.xml",
+    # Stance of the RaiSim examples: knees towards each other, feet a little outside the hips.
+    stance=(
+        *(_HAA, _HFE, -_KFE),
+        *(-_HAA, _HFE, -_KFE),
+        *(_HAA, -_HFE, _KFE),
+        *(-_HAA, -_HFE, _KFE),
+    ),
+    stance_height=0.4927,
+    foot_radius=0.031,
+    effort_limit=80.0,
+    velocity_limit=15.0,
+    action_scale=0.3,
+    gains={
+        # 80/2 is legged_gym's pair for ANYmal; the paper's 3/0.2 cannot hold 30 kg (docs/paper.md).
+        "default": Gains(kp=80.0, kd=2.0),
+        "paper": Gains(kp=3.0, kd=0.2),
+    },
+)
+
+ROBOTS = {ANYMAL_B.name: ANYMAL_B}
+"""The robots that policies may name."""

@@ -1,0 +1,177 @@
+"""A robot of one's own: its numbers from a TOML file, checked together with its model."""
+
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, cast
+
+import mujoco
+import numpy as np
+
+from gaitshift.data import Table, located, tables_in
+from gaitshift.errors import GaitshiftError
+from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.description import ANYMAL_B, ROBOTS, Gains, Robot
+from gaitshift.robot.legs import JOINTS, LEGS
+
+_NUMBERS = ("foot_radius", "effort_limit", "velocity_limit", "action_scale")
+_KEYS = ("name", "model", "stance", *_NUMBERS, "gains")
+
+_LEVEL = 0.05
+"""Feet of a stance may differ by this in height [m]; ours."""
+
+SENSORS = (
+    *(f"{leg}_position" for leg in LEGS),
+    *(f"{leg}_velocity" for leg in LEGS),
+    *(f"{leg}_touch" for leg in LEGS),
+    "body_touch",
+)
+"""Of a robot's model, in their order: framepos, framelinvel and touch of the sites of the feet, and
+touch of a site around the body."""
+
+
+def read_robot(path: Path) -> Robot:
+    """The robot in a TOML file, with its model checked.
+
+    Raises:
+        GaitshiftError: one line that begins with the file's path, and says what would be right.
+    """
+    with located(str(path)):
+        table = Table(tables_in(path), keys=_KEYS)
+        name = table.text("name")
+        if name == ANYMAL_B.name:
+            raise GaitshiftError(f"'{name}' comes with the package; give another name")
+        numbers = {key: table.number(key) for key in _NUMBERS}
+        for key, value in numbers.items():
+            if not value > 0:
+                raise GaitshiftError(f"'{key}' must be positive, not {value:g}")
+        stance = table.numbers("stance", 12, "12 angles: FL, FR, BL, BR × (HAA, HFE, KFE)")
+        gains = {preset: _gains(preset, of) for preset, of in table.table("gains").items()}
+        model_file = path.parent / table.text("model")
+        robot = Robot(
+            name=name,
+            model_file=model_file.resolve(),
+            stance=stance,
+            stance_height=np.inf,  # until the model is asked
+            gains=gains,
+            **numbers,
+        )
+        with located(str(model_file)):
+            return _with_height(robot, _checked_model(robot))
+
+
+def use_robot_file(path: Path | None) -> Robot:
+    """The robot in a file, known from here on; without a file ANYmal B."""
+    if path is None:
+        return ANYMAL_B
+    robot = read_robot(path)
+    use_robot(robot)
+    return robot
+
+
+def use_robot(robot: Robot) -> None:
+    """Makes policies and logs of this robot known to this process.
+
+    Raises:
+        GaitshiftError: another robot of its name is known.
+    """
+    known = ROBOTS.get(robot.name)
+    if known is not None and known != robot:
+        raise GaitshiftError(f"another robot is called '{robot.name}'; give another name")
+    ROBOTS[robot.name] = robot
+
+
+def to_dict(robot: Robot) -> dict[str, Any]:
+    """As a run keeps it: plain data."""
+    return {**asdict(robot), "model_file": str(robot.model_file)}
+
+
+def from_dict(data: dict[str, Any]) -> Robot:
+    """What `to_dict` gave.
+
+    Raises:
+        GaitshiftError: its model is gone.
+    """
+    gains = {name: Gains(**values) for name, values in data["gains"].items()}
+    path = Path(data["model_file"])
+    if not path.is_file():
+        raise GaitshiftError(f"the model of the robot '{data['name']}' is gone: {path}")
+    values = {**data, "gains": gains, "model_file": path, "stance": tuple(data["stance"])}
+    return Robot(**cast(dict[str, Any], values))
+
+
+def _gains(preset: str, data: object) -> Gains:
+    with located(f"gains.{preset}"):
+        table = Table(data, keys=("kp", "kd"))
+        kp, kd = table.number("kp"), table.number("kd")
+        if kp <= 0 or kd < 0:
+            raise GaitshiftError(
+                f"kp {kp:g}, kd {kd:g}: more than 0, and 0 or more, would be right"
+            )
+        return Gains(kp=kp, kd=kd)
+
+
+def _checked_model(robot: Robot) -> mujoco.MjModel:
+    """The robot's model compiled; one line where it is not what `World` works on."""
+    if not robot.model_file.is_file():
+        raise GaitshiftError("there is no such file")
+    try:
+        model = cast(mujoco.MjModel, robot.spec(robot.gains_of("default")).compile())
+    except ValueError as error:
+        raise GaitshiftError(f"MuJoCo cannot read it: {' '.join(str(error).split())}") from None
+    joints = [model.joint(i).name for i in range(model.njnt)]
+    free = model.njnt > 0 and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
+    if not free:
+        raise GaitshiftError("its first joint must be the free joint of the base")
+    _compare("joints after the free one", joints[1:], robot.joint_names)
+    driven = [model.joint(int(joint)).name for joint in model.actuator_trnid[:, 0]]
+    _compare("actuators, by the joints they turn,", driven, robot.joint_names)
+    _compare("sensors", [model.sensor(i).name for i in range(model.nsensor)], SENSORS)
+    touching = model.geom_conaffinity[:] & 1
+    for leg in LEGS:
+        body = model.site(f"{leg}_foot").bodyid[0] if _has_site(model, f"{leg}_foot") else None
+        if body is None or not touching[model.geom_bodyid == body].any():
+            raise GaitshiftError(
+                f"a site {leg}_foot, and on its body a shape with conaffinity 1, would be right"
+            )
+    if not (model.geom_group[model.geom_bodyid == model.jnt_bodyid[0]] <= 2).any():
+        raise GaitshiftError("no shape of its base is in group 0, 1 or 2: those are drawn")
+    substeps = CONTROL_PERIOD / model.opt.timestep
+    if abs(substeps - round(substeps)) > 1e-6 or round(substeps) < 1:
+        raise GaitshiftError(
+            f"a timestep of {model.opt.timestep:g} s does not divide {CONTROL_PERIOD:g} s; "
+            "0.0025 would be right"
+        )
+    return model
+
+
+def _compare(what: str, found: list[str], wanted: tuple[str, ...]) -> None:
+    if tuple(found) == wanted:
+        return
+    at = next(
+        (i for i, pair in enumerate(zip(found, wanted, strict=False)) if pair[0] != pair[1]),
+        min(len(found), len(wanted)),
+    )
+    here = found[at] if at < len(found) else "nothing"
+    right = wanted[at] if at < len(wanted) else "nothing"
+    raise GaitshiftError(
+        f"{what} must be {', '.join(wanted[:4])} … {wanted[-1]}; number {at + 1} is {here}, "
+        f"{right} would be right"
+    )
+
+
+def _has_site(model: mujoco.MjModel, name: str) -> bool:
+    return mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) >= 0
+
+
+def _with_height(robot: Robot, model: mujoco.MjModel) -> Robot:
+    """The robot with the height of its base in the stance, its lowest foot just touching."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0, 0, 0, 1, 0, 0, 0, *robot.stance]
+    mujoco.mj_kinematics(model, data)
+    feet = [float(data.site(f"{leg}_foot").xpos[2]) for leg in LEGS]
+    if (apart := max(feet) - min(feet)) > _LEVEL:
+        raise GaitshiftError(
+            f"in the stance the feet are {100 * apart:.0f} cm apart in height; level feet "
+            f"would be right (angles in the order of {', '.join(LEGS)} × {', '.join(JOINTS)})"
+        )
+    return replace(robot, stance_height=robot.foot_radius - min(feet))

@@ -1,0 +1,41 @@
+"""α modified online: by time, or by speed (paper III-E: it "can be modified online")."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.shift.signals import Signals
+
+QUANTITIES = ("speed", "time")
+"""What α may follow: the commanded forward speed [m/s], or the time [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modulation:
+    """A factor on α, straight between given points and constant beyond them."""
+
+    of: Literal["speed", "time"]
+    """What it follows."""
+    points: tuple[tuple[float, float], ...]
+    """Pairs of a speed [m/s] or time [s], rising, and the factor there."""
+
+    def __post_init__(self) -> None:
+        if self.of not in QUANTITIES:
+            raise GaitshiftError(f"α follows {' or '.join(QUANTITIES)}, not {self.of!r}")
+        if not self.points or any(b[0] <= a[0] for a, b in pairwise(self.points)):
+            raise GaitshiftError(
+                f"α over {self.of}: points as in [[0.4, 0.8], [1.2, 1.0]], {self.of}s rising"
+            )
+        if not all(np.isfinite(x) and factor > 0 for x, factor in self.points):
+            raise GaitshiftError(f"α over {self.of}: factors must be positive")
+
+    def factor(self, signals: Signals) -> Float[np.ndarray, " N"]:
+        """Factor on each robot's α now."""
+        at, factors = zip(*self.points, strict=True)
+        if self.of == "time":
+            return np.full(signals.robots, float(np.interp(signals.time, at, factors)))
+        return np.interp(signals.need("speed_command", "α over speed"), at, factors)

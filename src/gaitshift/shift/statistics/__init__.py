@@ -1,0 +1,1 @@
+"""What shift conditions watch: one statistic a file."""

@@ -1,0 +1,47 @@
+"""A rival statistic: how much roll and pitch vary."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistic import check_positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class AttitudeVariance:
+    """Standard deviation of roll and pitch together, about their own running means [rad].
+
+    Means forget by e in `window`. NaN until a window has gone by.
+    """
+
+    window: float = 1.0
+    """[s]"""
+
+    unit = "rad"
+    width = 1
+    needs = ()
+
+    def __post_init__(self) -> None:
+        check_positive(self, "window")
+
+    def start(self, n: int) -> Float[np.ndarray, "N 5"]:
+        """Sum of weights, means of roll and pitch, and of their squared distances from them."""
+        return np.zeros((n, 5))
+
+    def step(
+        self, state: Float[np.ndarray, "N 5"], signals: Signals
+    ) -> tuple[Float[np.ndarray, "N 5"], Float[np.ndarray, "N 1"]]:
+        """Means after this step, and the deviation."""
+        x, y, z = signals.gravity_b.T
+        angle = np.stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))], axis=1)
+        share = signals.period / self.window
+        weight = state[:, :1] + share * (1.0 - state[:, :1])
+        gain = share / weight  # a plain mean at first, then a forgetting one
+        off = angle - state[:, 1:3]
+        mean = state[:, 1:3] + gain * off
+        square = (1.0 - gain) * (state[:, 3:] + gain * off * off)
+        value = np.sqrt(square.sum(axis=1, keepdims=True))
+        after = np.concatenate([weight, mean, square], axis=1)
+        return after, np.where(weight < 1.0 - np.exp(-1.0), np.nan, value)

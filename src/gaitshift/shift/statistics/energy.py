@@ -1,0 +1,46 @@
+"""A rival statistic: what a metre costs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.robot.motion import GRAVITY
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistic import check_positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class CostOfTransport:
+    """Σ|τ q̇| / (m g v) over a running window; NaN until the window has gone by once."""
+
+    window: float = 1.0
+    """Power and speed are means that forget by e in this time [s]."""
+    mass: float = 30.48
+    """[kg]; ANYmal B's."""
+    least_speed: float = 0.1
+    """A slower robot counts as this fast [m/s]."""
+
+    unit = ""
+    width = 1
+    needs = ("power", "velocity_b")
+
+    def __post_init__(self) -> None:
+        check_positive(self, "window", "mass", "least_speed")
+
+    def start(self, n: int) -> Float[np.ndarray, "N 3"]:
+        """Sum of weights, mean power [W] and mean forward speed [m/s], nothing seen yet."""
+        return np.zeros((n, 3))
+
+    def step(
+        self, state: Float[np.ndarray, "N 3"], signals: Signals
+    ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
+        """Means after this step, and the cost."""
+        power = signals.need("power", "cost_of_transport")
+        speed = signals.need("velocity_b", "cost_of_transport")[:, 0]
+        now = np.stack([np.ones(len(power)), power, speed], axis=1)
+        after = state + signals.period / self.window * (now - state)
+        weight, mean_power, mean_speed = after.T
+        mean_speed = np.maximum(mean_speed / weight, self.least_speed)
+        cost = mean_power / weight / (self.mass * GRAVITY * mean_speed)
+        return after, np.where(weight < 1.0 - np.exp(-1.0), np.nan, cost)[:, None]

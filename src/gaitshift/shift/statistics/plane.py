@@ -1,0 +1,67 @@
+"""How far the last touches of the feet lie from one plane: slopes are not roughness."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistics.touches import Touches, TouchState, fit_plane
+
+LEAST = 4
+"""Touches below which there is nothing to tell: a plane goes through any three."""
+
+_RIDGE = 1e-9
+"""[m²], where feet stand in one line."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlaneResidual:
+    """Standard deviation of the last touches about the plane through them, along the vertical [m].
+
+    √(Σr² / (m − 3)) for the m touches kept, the degrees of freedom that a plane leaves. Leg
+    odometry carries the touches along. With one touch a foot this is the paper's h less a plane.
+    """
+
+    touches: int = 2
+    """Touches kept of each foot."""
+    least_swing: float = 0.05
+    """A foot that comes down again sooner has bounced: it is the same touch [s]."""
+
+    unit = "m"
+    width = 1
+    needs = ()
+
+    def __post_init__(self) -> None:
+        _ = self._memory
+
+    @cached_property
+    def _memory(self) -> Touches:
+        return Touches(kept=self.touches, least_swing=self.least_swing)
+
+    def start(self, n: int) -> TouchState:
+        """State of n robots of which no foot has touched."""
+        return self._memory.start(n)
+
+    def step(
+        self, state: TouchState, signals: Signals
+    ) -> tuple[TouchState, Float[np.ndarray, "N 1"]]:
+        """Touches after this step, and how far from a plane they lie."""
+        after, _, _ = self._memory.step(state, signals)
+        points = after.points
+        return after, deviation(points, ~np.isnan(points[..., 0]))[:, None]
+
+
+def deviation(
+    points: Float[np.ndarray, "N P 3"], known: Bool[np.ndarray, "N P"]
+) -> Float[np.ndarray, " N"]:
+    """√(Σr² / (m − 3)) of the m known points about their least-squares plane z(x, y) [m].
+
+    NaN below four points; points that lie in one line are held against the line.
+    """
+    count = known.sum(axis=1)
+    above = fit_plane(points, known, _RIDGE).above(points)
+    residual = np.where(known, above, 0.0)
+    variance = (residual * residual).sum(axis=1) / np.maximum(count - 3, 1)
+    return np.where(count < LEAST, np.nan, np.sqrt(variance))

@@ -1,0 +1,63 @@
+"""A rival statistic: how fast feet slide that ought to stand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistic import check_positive
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SlipState:
+    """What `Slip` remembers."""
+
+    position_b: Float[np.ndarray, "N 4 3"]
+    """Feet a step ago [m]."""
+    contact: Bool[np.ndarray, "N 4"]
+    """Contacts a step ago."""
+    speed: Float[np.ndarray, "N 4"]
+    """Running mean of the speed of each foot while it touches [m/s]; NaN before that."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slip:
+    """Speed of each foot over the ground while it touches [m/s], a running mean.
+
+    v + ω × p + ṗ in the body frame: base velocity from the robot's state estimation, the foot's own
+    from two steps in which it touched. The mean forgets by e in `window` of contact.
+    """
+
+    window: float = 0.2
+    """[s of contact]"""
+
+    unit = "m/s"
+    width = 4
+    needs = ("velocity_b", "angular_velocity_b")
+
+    def __post_init__(self) -> None:
+        check_positive(self, "window")
+
+    def start(self, n: int) -> SlipState:
+        """State of n robots that have not been seen."""
+        return SlipState(
+            position_b=np.zeros((n, 4, 3)),
+            contact=np.zeros((n, 4), dtype=bool),
+            speed=np.full((n, 4), np.nan),
+        )
+
+    def step(
+        self, state: SlipState, signals: Signals
+    ) -> tuple[SlipState, Float[np.ndarray, "N 4"]]:
+        """Mean speeds after this step."""
+        velocity: np.ndarray = signals.need("velocity_b", "slip")[:, None]
+        angular: np.ndarray = signals.need("angular_velocity_b", "slip")[:, None]
+        position = signals.foot_position_b
+        own = (position - state.position_b) / signals.period
+        speed: np.ndarray = np.linalg.norm(velocity + np.cross(angular, position) + own, axis=2)
+        share = min(1.0, signals.period / self.window)
+        mean = state.speed + share * (speed - state.speed)
+        mean = np.where(np.isnan(state.speed), speed, mean)
+        mean = np.where(signals.contact & state.contact, mean, state.speed)
+        return SlipState(position_b=position, contact=signals.contact, speed=mean), mean

@@ -1,0 +1,204 @@
+"""How far from where the last touches let one expect it the ground ahead is met."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistics.heading import HeadingState, HeadingWatch
+from gaitshift.shift.statistics.touches import Touches, TouchState, fit_plane
+
+LEAST = 6
+"""Earlier touches from which a plane is worth believing."""
+
+AHEAD = 0.1
+"""Ground is new where no earlier touch lies further ahead by more than this [m]."""
+
+RIDGE = 0.02
+"""[m²]: a plane through touches that are near one line does not tilt across it at will."""
+
+LAG = 3
+"""An error is held against the one before it, and the one this many before it: of a trot's front
+feet, which take turns, against the other foot half a stride and one and a half strides ago."""
+
+FROM_MEAN = math.sqrt(math.pi) / 2.0
+"""Deviation of normal errors over the mean size of their differences: 2/√π deviations."""
+
+STEEP = 0.08
+"""Rise over run from which ground is steep: a slope of 5°; ours, noise of 10 cm seldom is."""
+
+STEEP_FOR = 15.0
+"""Touchdowns in which steep ground is forgotten by e."""
+
+STEADY = 0.0055
+"""A body that is off its heading by less than this [rad] keeps to it; ours, a trot's on flat."""
+
+ASIDE_WINDOW = 1.0
+"""How far it is off is a root mean square that forgets by e in this time [s]."""
+
+_HEADING = HeadingWatch()
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SurpriseState:
+    """What `TouchdownSurprise` remembers."""
+
+    touches: TouchState
+    """The touches of all feet."""
+    heading: HeadingState
+    """The heading that the robot keeps to."""
+    aside: Float[np.ndarray, " N"]
+    """Mean square of how far it is off that [rad²]."""
+    error: Float[np.ndarray, "N 4"]
+    """The last errors, the last first [m]; NaN before that."""
+    change: Float[np.ndarray, "N 2"]
+    """Mean sizes of their changes, over one touchdown and over `LAG` [m]."""
+    steep: Float[np.ndarray, " N"]
+    """Rise over run of the steepest of the last planes, the less the longer ago."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TouchdownSurprise:
+    """How much the errors of the last touchdowns differ from one to the next [m].
+
+    Each foot that comes down on new ground, ahead of all earlier touches, is held against the plane
+    through those, along the vertical: that is its error. A slope has none; where it begins errors
+    grow and fade; a single step changes them once; noise changes them at each touchdown. The number
+    is the errors' deviation by the mean size of their changes from one touchdown to the next (after
+    von Neumann 1941, who takes their squares, in which a single step weighs more). A drift, as at
+    the foot of a slope, is taken out: a change over n touchdowns has n times as much of it as one
+    over one, and so n² m₁² − mₙ², over n² − 1, of the means m has none, and is m₁² where errors
+    know nothing of one another (`LAG`, `FROM_MEAN`). Means start at 0: what was not seen is smooth.
+    Feet that come down where others stood before say nothing new, and do not count.
+
+    Two things make it smaller. Where the ground was steep, its end is to be expected: the number is
+    divided by how many times steeper than `STEEP` the plane was of late. And odometry by the feet
+    is worth the less the more the body is turned aside, as at the edge of a step: it is divided by
+    how many times further than `STEADY` the robot is off its heading. One that is thrown off it
+    altogether stumbles: all is forgotten, and nothing said until there are errors enough again.
+    Where no yaw is given, neither of the last two is done.
+    """
+
+    touches: int = 4
+    """Touches of each foot that the plane goes through."""
+    memory: float = 10.0
+    """Touchdowns on new ground in which the means forget by e; 1: the last change alone."""
+    least_swing: float = 0.05
+    """A foot that comes down again sooner has bounced: it is the same touch [s]."""
+
+    unit = "m"
+    width = 1
+    needs = ()
+
+    def __post_init__(self) -> None:
+        _ = self._memory
+        if not 1.0 <= self.memory <= 1000.0:
+            raise GaitshiftError(f"memory = {self.memory:g}: 1 to 1000 touchdowns would be right")
+
+    @cached_property
+    def _memory(self) -> Touches:
+        return Touches(kept=self.touches, least_swing=self.least_swing)
+
+    def start(self, n: int) -> SurpriseState:
+        """State of n robots of which no foot has touched."""
+        return SurpriseState(
+            touches=self._memory.start(n),
+            heading=_HEADING.start(n),
+            aside=np.zeros(n),
+            error=np.full((n, 1 + LAG), np.nan),
+            change=np.zeros((n, 2)),
+            steep=np.zeros(n),
+        )
+
+    def step(
+        self, state: SurpriseState, signals: Signals
+    ) -> tuple[SurpriseState, Float[np.ndarray, "N 1"]]:
+        """Errors after this step, and what their changes come to; NaN until there are enough."""
+        touches, new, foot = self._memory.step(state.touches, signals)
+        heading, off = _HEADING.step(state.heading, signals)
+        share = min(1.0, signals.period / ASIDE_WINDOW)
+        aside = state.aside + share * (off * off - state.aside)
+        error, change, steep = state.error, state.change, state.steep
+        ids = np.flatnonzero(new.any(axis=1))
+        if ids.size:
+            error, change, steep = error.copy(), change.copy(), steep.copy()
+            above, slope, counts = _met(state.touches, touches, new, foot, ids)
+            error[ids], change[ids] = self._take_in(error[ids], change[ids], above, counts)
+            met = counts.sum(axis=1)
+            kept = np.exp(-met / STEEP_FOR) * steep[ids]
+            steep[ids] = np.where(met > 0, np.maximum(slope, kept), steep[ids])
+        thrown = np.abs(off) > _HEADING.limit
+        if thrown.any():
+            touch = np.where(thrown[:, None, None, None], np.nan, touches.touch)
+            touches = replace(touches, touch=touch)
+            error = np.where(thrown[:, None], np.nan, error)
+            change = np.where(thrown[:, None], 0.0, change)
+            steep = np.where(thrown, 0.0, steep)
+        without_drift = (LAG**2 * change[:, 0] ** 2 - change[:, 1] ** 2) / (LAG**2 - 1)
+        deviation = FROM_MEAN * np.sqrt(np.maximum(without_drift, 0.0))
+        aside_by = np.maximum(np.sqrt(aside) / STEADY, 1.0)
+        value = deviation / aside_by / np.maximum(steep / STEEP, 1.0)
+        known = ~np.isnan(error[:, -1])
+        after = SurpriseState(
+            touches=touches,
+            heading=heading,
+            aside=aside,
+            error=error,
+            change=change,
+            steep=steep,
+        )
+        return after, np.where(known, value, np.nan)[:, None]
+
+    def _take_in(
+        self,
+        error: Float[np.ndarray, "K 4"],
+        change: Float[np.ndarray, "K 2"],
+        above: Float[np.ndarray, "K 4"],
+        counts: Bool[np.ndarray, "K 4"],
+    ) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, "K 2"]]:
+        """Errors and means after the feet that count, `above` [m] where they were expected."""
+        for leg in range(4):
+            size = np.abs(above[:, leg, None] - error[:, [0, LAG - 1]])
+            taken = counts[:, leg, None] & ~np.isnan(size)
+            change = np.where(taken, change + (size - change) / self.memory, change)
+            shifted = np.concatenate([above[:, leg, None], error[:, :-1]], axis=1)
+            error = np.where(counts[:, leg, None], shifted, error)
+        return error, change
+
+
+def _met(
+    before: TouchState,
+    after: TouchState,
+    new: Bool[np.ndarray, "N 4"],
+    foot: Float[np.ndarray, "N 4 3"],
+    ids: np.ndarray,
+) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, " K"], Bool[np.ndarray, "K 4"]]:
+    """Robots `ids` against the plane of their earlier touches.
+
+    How far above it their feet are [m], its rise over run, and which feet count: those do that came
+    down on new ground, where enough earlier touches are known.
+    """
+    points, came = before.points[ids], foot[ids]
+    known = ~np.isnan(points[..., 0])
+    plane = fit_plane(points, known, RIDGE)
+    way = after.odometry.base[ids, :2] - plane.middle[:, :2]
+    way = way / np.maximum(np.hypot(way[:, :1], way[:, 1:]), 1e-9)
+    ahead = _along(came, way) + AHEAD > _furthest(_along(points, way), known)[:, None]
+    counts = new[ids] & ahead & (known.sum(axis=1) >= LEAST)[:, None]
+    return plane.above(came), np.hypot(*plane.slope.T), counts
+
+
+def _along(
+    points: Float[np.ndarray, "K P 3"], way: Float[np.ndarray, "K 2"]
+) -> Float[np.ndarray, "K P"]:
+    return points[..., 0] * way[:, :1] + points[..., 1] * way[:, 1:]
+
+
+def _furthest(
+    along: Float[np.ndarray, "K P"], known: Bool[np.ndarray, "K P"]
+) -> Float[np.ndarray, " K"]:
+    return np.where(known, along, -np.inf).max(axis=1)

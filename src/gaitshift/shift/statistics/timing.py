@@ -1,0 +1,53 @@
+"""A rival statistic: feet that come down early or late."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.shift.signals import Signals
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TimingState:
+    """What `ContactTiming` remembers."""
+
+    contact: Bool[np.ndarray, "N 4"]
+    """Contacts a step ago."""
+    touchdown: Float[np.ndarray, "N 4"]
+    """When each foot last came down [s]; NaN before that."""
+    error: Float[np.ndarray, "N 4"]
+    """By how much its last stride was off [s]; NaN before two touchdowns."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactTiming:
+    """By how much the last stride of each foot was shorter or longer than commanded [s].
+
+    A stride lasts from touchdown to touchdown; the machine's cycle is as long as the commanded
+    stride frequency says. A foot that is overdue shows it before it comes down.
+    """
+
+    unit = "s"
+    width = 4
+    needs = ("stride",)
+
+    def start(self, n: int) -> TimingState:
+        """State of n robots of which no foot has come down."""
+        return TimingState(
+            contact=np.ones((n, 4), dtype=bool),
+            touchdown=np.full((n, 4), np.nan),
+            error=np.full((n, 4), np.nan),
+        )
+
+    def step(
+        self, state: TimingState, signals: Signals
+    ) -> tuple[TimingState, Float[np.ndarray, "N 4"]]:
+        """Errors after this step."""
+        stride = signals.need("stride", "contact_timing")[:, None]
+        down = signals.contact & ~state.contact
+        since = signals.time - state.touchdown
+        error = np.where(down, np.abs(since - stride), state.error)
+        touchdown = np.where(down, signals.time, state.touchdown)
+        after = TimingState(contact=signals.contact, touchdown=touchdown, error=error)
+        return after, np.fmax(error, signals.time - touchdown - stride)

@@ -1,0 +1,106 @@
+"""Where the feet touched last, carried along by leg odometry: what terrain can be read from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistics.odometry import LegOdometry, OdometryState
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TouchState:
+    """What `Touches` remembers."""
+
+    odometry: OdometryState
+    """Where the base is."""
+    touch: Float[np.ndarray, "N 4 K 3"]
+    """Where each foot touched, the last first, in the odometry's frame [m]; NaN before that."""
+    time_up: Float[np.ndarray, "N 4"]
+    """For how long each foot has not touched [s]."""
+
+    @property
+    def points(self) -> Float[np.ndarray, "N P 3"]:
+        """All touches in a row."""
+        n, feet, kept, _ = self.touch.shape
+        return self.touch.reshape(n, feet * kept, 3)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Touches:
+    """Keeps the last touches of each foot."""
+
+    kept: int
+    """Touches of each foot."""
+    least_swing: float
+    """A foot that comes down again sooner has bounced: it is the same touch [s]."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.kept <= 100:
+            raise GaitshiftError(f"touches = {self.kept}: 1 to 100 a foot would be right")
+        if not 0.0 <= self.least_swing < np.inf:
+            raise GaitshiftError(f"least_swing = {self.least_swing:g}: 0 s or more would be right")
+
+    def start(self, n: int) -> TouchState:
+        """State of n robots of which no foot has touched."""
+        return TouchState(
+            odometry=LegOdometry().start(n),
+            touch=np.full((n, 4, self.kept, 3), np.nan),
+            time_up=np.full((n, 4), np.inf),
+        )
+
+    def step(
+        self, state: TouchState, signals: Signals
+    ) -> tuple[TouchState, Bool[np.ndarray, "N 4"], Float[np.ndarray, "N 4 3"]]:
+        """The touches after this step, which feet came down in it, and where all feet are [m].
+
+        A foot's last touch goes along with it while it stands.
+        """
+        odometry, foot = LegOdometry().step(state.odometry, signals)
+        contact = signals.contact
+        new = contact & (state.time_up >= self.least_swing)
+        touch = state.touch.copy()
+        if new.any():
+            touch[:, :, 1:] = np.where(new[..., None, None], touch[:, :, :-1], touch[:, :, 1:])
+        touch[:, :, 0] = np.where(contact[..., None], foot, touch[:, :, 0])
+        time_up = np.where(contact, 0.0, state.time_up + signals.period)
+        return TouchState(odometry=odometry, touch=touch, time_up=time_up), new, foot
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plane:
+    """z = height + slope · (x, y) about a middle point, for each of N robots."""
+
+    middle: Float[np.ndarray, "N 3"]
+    """Mean of the points it goes through [m]."""
+    slope: Float[np.ndarray, "N 2"]
+    """dz/dx and dz/dy."""
+
+    def above(self, points: Float[np.ndarray, "N P 3"]) -> Float[np.ndarray, "N P"]:
+        """How far each point lies above it, along the vertical [m]."""
+        x, y, z = (points[..., axis] - self.middle[:, axis, None] for axis in range(3))
+        return z - self.slope[:, :1] * x - self.slope[:, 1:] * y
+
+
+def fit_plane(
+    points: Float[np.ndarray, "N P 3"], known: Bool[np.ndarray, "N P"], ridge: float
+) -> Plane:
+    """Least-squares plane of each robot's known points.
+
+    Args:
+        points: x, y, z [m].
+        known: which of them count.
+        ridge: keeps slopes small [m²] in directions in which the points hardly spread.
+    """
+    count = np.maximum(known.sum(axis=1), 1)
+    kept = np.where(known[..., None], points, 0.0)
+    middle = kept.sum(axis=1) / count[:, None]
+    x, y, z = (np.where(known, kept[..., i] - middle[:, i, None], 0.0) for i in range(3))
+    xx, xy, yy = (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
+    xz, yz = (x * z).sum(axis=1), (y * z).sum(axis=1)
+    determinant = (xx + ridge) * (yy + ridge) - xy * xy
+    slope_x = (xz * (yy + ridge) - yz * xy) / determinant
+    slope_y = (yz * (xx + ridge) - xz * xy) / determinant
+    return Plane(middle=middle, slope=np.stack([slope_x, slope_y], axis=1))

@@ -1,0 +1,42 @@
+"""A rival statistic: how much less the policy's own critic expects than it did."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistic import check_positive
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValueDrop:
+    """Slow running mean of the critic's value less the fast one; NaN for the first slow window."""
+
+    fast: float = 0.5
+    """Window of the fast mean [s]: a stride, over which values swing."""
+    slow: float = 4.0
+    """Window of the slow mean [s]."""
+
+    unit = ""
+    width = 1
+    needs = ("value",)
+
+    def __post_init__(self) -> None:
+        check_positive(self, "fast", "slow")
+
+    def start(self, n: int) -> Float[np.ndarray, "N 3"]:
+        """Fast mean, slow mean, and the steps seen."""
+        return np.zeros((n, 3))
+
+    def step(
+        self, state: Float[np.ndarray, "N 3"], signals: Signals
+    ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
+        """Means after this step, and the drop."""
+        value = signals.need("value", "value_drop")
+        fast, slow, seen = state.T
+        seen = seen + 1.0
+        fast = fast + np.maximum(1.0 / seen, signals.period / self.fast) * (value - fast)
+        slow = slow + np.maximum(1.0 / seen, signals.period / self.slow) * (value - slow)
+        drop = np.where(seen * signals.period < self.slow, np.nan, slow - fast)
+        return np.stack([fast, slow, seen], axis=1), drop[:, None]

@@ -1,0 +1,135 @@
+"""The rows of the figures: each draws one thing of one robot over time into one pair of axes."""
+
+# matplotlib's own stubs leave **kwargs untyped:
+# pyright: reportUnknownMemberType=false
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from gaitshift.lab.log import Log
+from gaitshift.robot.legs import LEGS
+from gaitshift.show.plots.palette import GROUND, INK, LEG_COLOURS, PAPER, QUIET, gait_colours
+from gaitshift.show.plots.signals import (
+    forward_speed,
+    gait_at,
+    gait_spans,
+    ground_below,
+    period,
+    smoothed,
+    spans,
+)
+from gaitshift.show.plots.style import DASHES, few_ticks, name_row
+
+_SPEED_SIGMA = 0.2
+"""Of the window over the speed [s]: half a stride, so that the course is seen and not the steps."""
+
+_LANE = 0.74
+"""Height of a contact bar, of the distance from one foot's lane to the next."""
+
+_ROOM = 0.07
+"""Shortest stretch that has words written in, of the time shown."""
+
+
+def draw_gaits(axes: Axes, log: Log, robot: int) -> None:
+    """A band in the colour of the gait in force, with its name."""
+    colours = gait_colours(log.gaits)
+    for name, span in gait_spans(log, robot):
+        axes.axvspan(span.begin, span.end, color=colours[name], linewidth=0)
+        if span.end - span.begin >= _ROOM * np.ptp(log.time):
+            axes.text(span.middle, 0.46, name, color=PAPER, weight="bold", ha="center", va="center")
+    axes.set_ylim(0, 1)
+    axes.set_yticks([])
+    axes.grid(visible=False)
+
+
+def tint_gaits(axes: Axes, log: Log, robot: int) -> None:
+    """A breath of the gait's colour behind a row."""
+    colours = gait_colours(log.gaits)
+    for name, span in gait_spans(log, robot):
+        axes.axvspan(span.begin, span.end, color=colours[name], alpha=0.07, linewidth=0, zorder=0)
+
+
+def draw_contacts(axes: Axes, log: Log, robot: int) -> None:
+    """A bar for each stance phase of each foot, in the colour of the gait it began in."""
+    colours = gait_colours(log.gaits)
+    for leg in range(len(LEGS)):
+        contact = log.contact[:, robot, leg]
+        stances = [span for span in spans(log, contact) if contact[span.entry]]
+        bars = [(span.begin, span.end - span.begin) for span in stances]
+        faces = [colours[gait_at(log, robot, span.entry)] for span in stances]
+        axes.broken_barh(bars, (leg - _LANE / 2, _LANE), facecolors=faces, linewidth=0)
+    axes.set_ylim(len(LEGS) - 0.5, -0.5)
+    axes.set_yticks(range(len(LEGS)), LEGS)
+    axes.grid(visible=False)
+    name_row(axes, "feet on the ground")
+
+
+def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
+    """The h_i that the shift condition compares, each from the foot's first touch on."""
+    for leg, name in enumerate(LEGS):
+        known = np.cumsum(log.contact[:, robot, leg]) > 0
+        height, colour = 100 * log.foot_height[known, robot, leg], LEG_COLOURS[leg]
+        axes.plot(
+            log.time[known],
+            height,
+            color=colour,
+            label=name,
+            drawstyle="steps-post",
+            linewidth=1.5,
+        )
+    axes.legend(
+        ncols=4,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.99),
+        borderpad=0.0,
+        borderaxespad=0.0,
+        handlelength=1.1,
+        handletextpad=0.4,
+        columnspacing=1.2,
+    )
+    few_ticks(axes)
+    name_row(axes, "foot height at last touch, $h_i$ [cm]")
+
+
+def draw_counter(axes: Axes, log: Log, robot: int) -> None:
+    """The counter k below the threshold that it is held against, and the threshold's value."""
+    k, threshold = log.k[:, robot], log.threshold[:, robot]
+    axes.fill_between(log.time, k, color=QUIET, alpha=0.25, linewidth=0)
+    axes.plot(log.time, k, color=INK, label="k")
+    axes.plot(log.time, threshold, color=QUIET, linestyle=DASHES, drawstyle="steps-post", label="β")
+    for span in spans(log, threshold):
+        value = float(threshold[span.entry])
+        if span.end - span.begin >= _ROOM * np.ptp(log.time):
+            axes.text(span.middle, value, f"β = {value:g}", color=QUIET, ha="center", va="bottom")
+    axes.set_ylim(0, 1.3 * max(float(k.max()), float(threshold.max())))
+    few_ticks(axes)
+    axes.grid(visible=False)
+    name_row(axes, "counter k, threshold β [counts]")
+
+
+def draw_speed(axes: Axes, log: Log, robot: int) -> None:
+    """Forward speed, at each step and smoothed, and the speed commanded."""
+    speed, command = forward_speed(log, robot), log.command[:, robot, 0]
+    course = smoothed(speed, period(log), _SPEED_SIGMA)
+    axes.plot(log.time, speed, color=QUIET, alpha=0.35, linewidth=0.8, label="each step")
+    axes.plot(
+        log.time, command, color=QUIET, linestyle=DASHES, drawstyle="steps-post", label="command"
+    )
+    axes.plot(log.time, course, color=INK, label="smoothed")
+    low = min(0.0, float(course.min()))
+    high = max(float(course.max()), float(command.max()), low + 0.1)
+    axes.set_ylim(low, low + 1.25 * (high - low))
+    few_ticks(axes)
+    name_row(axes, "forward speed, dashed: command [m/s]")
+
+
+def draw_ground(axes: Axes, log: Log, robot: int) -> None:
+    """The ground in profile, and the path of the base above it."""
+    base, ground = log.qpos[:, robot, 2], ground_below(log, robot)
+    bottom = min(float(ground.min()), 0.0) - 0.08
+    axes.fill_between(log.time, ground, bottom, color=GROUND, linewidth=0)
+    axes.plot(log.time, ground, color=INK, linewidth=1.0, label="ground")
+    axes.plot(log.time, base, color=INK, label="base")
+    axes.set_ylim(bottom, max(float(base.max()), float(ground.max())) + 0.08)
+    few_ticks(axes)
+    name_row(axes, "base and ground, height [m]")

@@ -1,0 +1,145 @@
+"""What figures and videos derive from a log: spans of time, speeds, the ground, smooth courses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Shaped
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.log import Log
+from gaitshift.sim.terrain import Terrain
+
+_SAME_GROUND = 0.01
+"""Grounds that differ by no more below all feet are the same [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Span:
+    """A stretch of time in which something stays as it is."""
+
+    begin: float
+    """[s]"""
+    end: float
+    """[s]"""
+    entry: int
+    """The log's entry that it begins with."""
+
+    @property
+    def middle(self) -> float:
+        """Half-way between them [s]."""
+        return (self.begin + self.end) / 2
+
+
+def check_robot(log: Log, robot: int) -> None:
+    """`GaitshiftError` unless the log has a course in time, and this robot."""
+    steps, count = log.k.shape
+    if steps < 2:
+        raise GaitshiftError(f"a log of {steps} control steps shows nothing; 2 is the least")
+    if not 0 <= robot < count:
+        raise GaitshiftError(f"robot {robot} is not in the log; it holds 0 to {count - 1}")
+
+
+def window(log: Log, t0: float, t1: float) -> Log:
+    """The entries of a log from `t0` to `t1` [s]; `GaitshiftError` where they are less than two."""
+    begin = int(np.searchsorted(log.time, t0, side="left"))
+    end = int(np.searchsorted(log.time, t1, side="right"))
+    if end - begin < 2:
+        raise GaitshiftError(
+            f"nothing to show from {t0:g} to {t1:g} s: the log goes from {log.time[0]:g} "
+            f"to {log.time[-1]:g} s"
+        )
+    return log.part(slice(begin, end))
+
+
+def period(log: Log) -> float:
+    """Time from one entry to the next [s]."""
+    return float(log.time[1] - log.time[0])
+
+
+def spans(log: Log, values: Shaped[np.ndarray, " T"]) -> list[Span]:
+    """Stretches of equal values. An entry stands for the time until the next one."""
+    cuts = np.flatnonzero(values[1:] != values[:-1]) + 1
+    entries = [0, *cuts.tolist()]
+    times = [*log.time[entries].tolist(), float(log.time[-1]) + period(log)]
+    return [Span(begin=times[i], end=times[i + 1], entry=entry) for i, entry in enumerate(entries)]
+
+
+def gait_at(log: Log, robot: int, entry: int) -> str:
+    """Name of the gait in force."""
+    return log.gaits[int(log.gait[entry, robot])]
+
+
+def gait_spans(log: Log, robot: int) -> list[tuple[str, Span]]:
+    """The gaits one after the other, and when each was in force."""
+    return [(gait_at(log, robot, s.entry), s) for s in spans(log, log.gait[:, robot])]
+
+
+def shift_times(log: Log, robot: int) -> list[float]:
+    """When another gait takes over [s], as long as the robot stands."""
+    fell = fall_time(log, robot)
+    starts = [span.begin for _, span in gait_spans(log, robot)[1:]]
+    return [time for time in starts if fell is None or time < fell]
+
+
+def fall_time(log: Log, robot: int) -> float | None:
+    """When the robot fell [s], if it did."""
+    fallen = np.flatnonzero(log.fallen[:, robot])
+    return float(log.time[fallen[0]]) if fallen.size else None
+
+
+def has_condition(log: Log, robot: int) -> bool:
+    """Whether a shift condition was at work: logs hold zeros where none was."""
+    return bool((log.threshold[:, robot] > 0).any())
+
+
+def forward_speed(log: Log, robot: int) -> Float[np.ndarray, " T"]:
+    """Velocity of the base along its own x axis [m/s]: what the command asks for."""
+    w, x, y, z = log.qpos[:, robot, 3:7].T
+    forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
+    return np.einsum("ti,ti->t", forward, log.qvel[:, robot, :3])
+
+
+def ground_of(log: Log) -> Terrain:
+    """The ground that the log keeps."""
+    return Terrain(
+        height=log.terrain_height,
+        size=(float(log.terrain_size[0]), float(log.terrain_size[1])),
+        origin=(float(log.terrain_origin[0]), float(log.terrain_origin[1])),
+        name=log.terrain,
+    )
+
+
+def walks_on_kept_ground(log: Log, robot: int) -> bool:
+    """Whether the ground that the log keeps is this robot's: of several it keeps the first."""
+    kept = ground_of(log).height_at(log.foot_position_w[:, robot, :, :2])
+    return bool(np.allclose(kept, _ground_below_feet(log, robot), atol=_SAME_GROUND))
+
+
+def ground_below(log: Log, robot: int) -> Float[np.ndarray, " T"]:
+    """Height of the ground below the base [m]; if the log does not keep it, below the feet."""
+    if walks_on_kept_ground(log, robot):
+        return ground_of(log).height_at(log.qpos[:, robot, :2])
+    return _ground_below_feet(log, robot).mean(axis=1)
+
+
+def _ground_below_feet(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
+    return log.foot_position_w[:, robot, :, 2] - log.clearance[:, robot]
+
+
+def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:
+    """Values every `step` [s], averaged in a Gaussian window of standard deviation `sigma` [s].
+
+    The window looks both ways, so nothing is delayed. Each point is the middle of the line that
+    fits best in its window (locally linear regression), so that a straight line stays one up to
+    its ends, where half of the window is empty.
+    """
+    reach = int(np.ceil(3 * sigma / step))
+    offset = np.arange(-reach, reach + 1)
+    weights = np.exp(-0.5 * (offset * step / sigma) ** 2)
+
+    def summed(course: Float[np.ndarray, " T"], power: int) -> Float[np.ndarray, " T"]:
+        return np.correlate(np.pad(course, reach), weights * offset**power, mode="valid")
+
+    s0, s1, s2 = (summed(np.ones(len(values)), power) for power in range(3))
+    total, moment = summed(values, 0), summed(values, 1)
+    return (s2 * total - s1 * moment) / (s0 * s2 - s1**2)

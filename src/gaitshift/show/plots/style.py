@@ -1,0 +1,99 @@
+"""How every figure looks: one typeface, quiet axes, words large enough for a telephone."""
+
+# matplotlib's own stubs leave **kwargs untyped:
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any, cast
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from PIL import Image
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.show.plots.palette import INK, PALE, PAPER, QUIET
+
+FORMATS = (".png", ".svg", ".pdf")
+"""File endings that figures are written to."""
+
+DPI = 160
+"""Pixels an inch: a figure 10 inches wide has 1600 pixels."""
+
+DASHES = (0, (4, 2))
+"""Line style of what is asked for, beside what is done."""
+
+_STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same words on every machine
+    "font.size": 13,
+    "text.color": INK,
+    "figure.facecolor": PAPER,
+    "axes.facecolor": PAPER,
+    "axes.edgecolor": QUIET,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 13,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.spines.left": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": PALE,
+    "grid.linewidth": 0.8,
+    "xtick.color": QUIET,
+    "ytick.color": QUIET,
+    "xtick.labelsize": 12,
+    "ytick.labelsize": 12,
+    "ytick.major.size": 0,
+    "lines.linewidth": 1.8,
+    "lines.solid_capstyle": "round",
+    "path.simplify_threshold": 0.5,
+    "legend.frameon": False,
+    "svg.hashsalt": "gaitshift",
+}
+
+
+@contextmanager
+def house_style() -> Generator[None]:
+    """Everything drawn inside looks alike, whatever the user's own settings are."""
+    with rc_context(cast(Any, _STYLE)):
+        yield
+
+
+def check_target(path: Path) -> None:
+    """`GaitshiftError` unless a figure can be written to `path`: asked before the work is done."""
+    if path.suffix.lower() not in FORMATS:
+        raise GaitshiftError(f"{path}: the name of a figure ends in {', '.join(FORMATS)}")
+    if not path.parent.is_dir():
+        raise GaitshiftError(f"{path}: there is no folder {path.parent}")
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Writes the figure, the same bytes for the same figure; a PNG in 256 colours, to be small."""
+    ending = path.suffix.lower()
+    if ending != ".png":
+        figure.savefig(
+            path, metadata={"Date": None} if ending == ".svg" else {"CreationDate": None}
+        )
+        return
+    pixels = BytesIO()
+    figure.savefig(pixels, format="png", dpi=DPI)
+    with Image.open(pixels) as image:
+        few = image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        few.save(path, optimize=True)
+
+
+def name_row(axes: Axes, label: str) -> None:
+    """Labels the y axis in upright words at its upper end, where a telephone shows them too."""
+    axes.set_ylabel(label, rotation=0, ha="left", va="bottom")
+    axes.yaxis.set_label_coords(0.0, 1.04)
+
+
+def few_ticks(axes: Axes) -> None:
+    """Few numbers on the y axis, and round ones."""
+    axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))

@@ -1,0 +1,182 @@
+"""The report of a reproduction: README.md, figures and small CSV in one folder."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.reproduction import tables
+from gaitshift.lab.reproduction.courses import HELD_FOR, WALKING_CHANGES, WALKING_SPEED
+from gaitshift.lab.reproduction.findings import Finding, findings
+from gaitshift.lab.reproduction.judging import Judged, judge
+from gaitshift.lab.reproduction.results import Results
+from gaitshift.lab.reproduction.settings import LOCKOUT
+from gaitshift.lab.reproduction.told import CURVES, GAITS, RUNS, Told
+from gaitshift.show.plots import reproduction as figures
+
+README = "README.md"
+
+_ALT = {
+    figures.REWARDS: "Reward over the iterations, by gait, beside the paper's landmarks",
+    figures.COMPARISONS: "Forward speed over the iterations, by setting",
+}
+
+
+def write_report(
+    results: Results,
+    runs: Path,
+    out: Path,
+    told: Told | None = None,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> dict[str, Any]:
+    """Writes all that the runs at hand say into `out`; gives the same as plain data.
+
+    Args:
+        results: the runs that are over.
+        runs: their folders.
+        out: the folder of the report.
+        told: runs that an earlier report tells of, whose folders may be gone.
+        report: called with the policies judged and those in all.
+    """
+    if not results.seeds:
+        raise GaitshiftError(f"{runs} holds no run that is over, so there is nothing to tell")
+    out.mkdir(parents=True, exist_ok=True)
+    judged = judge(results, runs, told or Told(), report)
+    found = findings(results)
+    gaits, ablations = tables.gait_rows(judged), tables.ablation_rows(results)
+    parts = {
+        RUNS: tables.run_rows(results),
+        GAITS: gaits,
+        tables.ABLATED_RUNS: ablations,
+        CURVES: list(tables.curve_rows(results)),
+    }
+    written = [name for name, rows in parts.items() if rows]
+    for name in written:
+        tables.write(parts[name], out / name)
+    written += figures.draw(results, judged, out)
+    (out / README).write_text(_readme(results, found, judged, ablations, written))
+    return {
+        "out": str(out),
+        "files": [README, *written],
+        "findings": [asdict(finding) for finding in found],
+        "gaits": gaits,
+        "ablations": ablations,
+    }
+
+
+def _readme(
+    results: Results,
+    found: list[Finding],
+    judged: list[Judged],
+    ablations: list[tables.Row],
+    written: list[str],
+) -> str:
+    parts = ["# The paper's recipe, run again", _introduction(results)]
+    if found:
+        parts += ["## What holds", _verdicts(found)]
+        parts += [
+            f"**{f.name[0].upper()}{f.name[1:]}.** *The paper:* {f.paper} *Measured:* {f.measured} "
+            f"**It {f.verdict}.**"
+            for f in found
+        ]
+    if judged:
+        parts += ["## The gaits", _gait_table(judged)]
+    parts += [
+        f"![{_ALT.get(name, 'Contacts of the feet over two seconds')}]({name})"
+        for name in written
+        if name.endswith(".png") and name != figures.COMPARISONS
+    ]
+    if len(ablations) > 1:
+        parts += ["## One thing changed at a time", _ablation_table(ablations)]
+    if figures.COMPARISONS in written:
+        parts.append(f"![{_ALT[figures.COMPARISONS]}]({figures.COMPARISONS})")
+    return "\n\n".join(parts) + "\n"
+
+
+def _introduction(results: Results) -> str:
+    plan = results.plan
+    recipe = plan.jobs[0].recipe
+    runs = sum(map(len, results.seeds.values()))
+    return "\n".join(
+        (
+            f"Written by `gaitshift reproduce` from {runs} of {len(plan.jobs)} runs; every number "
+            "below, and every verdict, is computed from them.",
+            f"{recipe.robots} robots × {recipe.steps} steps × {recipe.iterations} iterations on "
+            "flat ground, Table I and b = 200 alone, the paper's network and PPO numbers, 100 Hz; "
+            f"{plan.seeds} seeds a gait.",
+            "Two choices are ours: gains of 80/2, because Kp = 3 cannot hold this robot up "
+            f"(it is compared below), and a lock-out of {LOCKOUT} steps between two changes of the "
+            "machine's state, because the published plateau asks for it. The bonus is added.",
+            f"Each ablation changes one thing, for trot, over {plan.ablation_seeds} seeds and "
+            f"{plan.ablation_iterations} iterations, and is held against as much of the same.",
+            f"A run *walks* from the first iteration from which its mean speed stays above "
+            f"{WALKING_SPEED:g} m/s and its machine changes state more than {WALKING_CHANGES:g} "
+            f"times a second, {HELD_FOR} iterations running; *at the end* is the last tenth. "
+            "Figures of a training are those of robots that explore. Courses dip every "
+            f"{recipe.checkpoint_every} iterations: at a checkpoint all robots start anew.",
+        )
+    )
+
+
+def _verdicts(found: list[Finding]) -> str:
+    return _table(("statement", "verdict"), [(f.name, f"**{f.verdict}**") for f in found])
+
+
+def _gait_table(judged: list[Judged]) -> str:
+    head = (
+        "gait",
+        "seed",
+        "walks from iteration",
+        "survival",
+        "speed [m/s]",
+        "pattern fraction",
+        "cycles [1/s]",
+        "touchdowns a cycle",
+        "cost of transport",
+    )
+    return _table(
+        head,
+        [
+            (
+                one.gait,
+                str(one.seed),
+                _text(one.walks_at, "never"),
+                *map(_text, one.figures.values()),
+            )
+            for one in judged
+        ],
+    )
+
+
+def _ablation_table(rows: list[tables.Row]) -> str:
+    columns = {
+        "group": "question",
+        "label": "setting",
+        "walking": "walking",
+        "walk_from_iteration": "from iteration",
+        "as_fast": "as fast",
+        "late_speed": "speed at the end [m/s]",
+        "late_survival": "survival",
+        "late_changes_per_s": "changes of state [1/s]",
+        "late_stance_fraction": "share of steps in the stance of the state",
+    }
+    shown = [{**row, "walking": f"{row['walking']} of {row['seeds']}"} for row in rows]
+    return _table(
+        tuple(columns.values()),
+        [tuple(_text(row[key], "never") for key in columns) for row in shown],
+    )
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _text(value: str | float | None, nothing: str = "–") -> str:
+    if value is None:
+        return nothing
+    if isinstance(value, str):
+        return value
+    told = round(value, 2)  # first, or 4.9999 is told as 5.00 and, read back from a table, as 5
+    return f"{told:g}" if told == int(told) else f"{told:.2f}"

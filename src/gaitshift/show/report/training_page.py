@@ -1,0 +1,96 @@
+"""The page of a training: what its policies do, its course, its verdicts."""
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.log import Log
+from gaitshift.show.plots.training import COURSES, numbers, read_progress
+from gaitshift.show.report.data import lines, packed, run_data, series
+from gaitshift.show.report.log_page import STRETCH_HEAD, check_kind, stretches
+from gaitshift.show.report.page import Row, facts_table, table, write_page
+
+
+def write_training_report(
+    folder: Path, path: Path, walks: Sequence[tuple[str, Log]], *, title: str, summary: str
+) -> None:
+    """Writes the page of a training: its walks to choose from, its course, its verdicts.
+
+    Args:
+        folder: the run; its `progress.csv` and, where there are any, `verdicts.csv` are shown.
+        path: the HTML file.
+        walks: what policies of the run do, by name; the first robot of each log is shown.
+        title: what was trained.
+        summary: a sentence on it.
+
+    Raises:
+        GaitshiftError: a file of the run that cannot be read.
+    """
+    for _, log in walks:
+        check_kind(log)
+    write_page(
+        path,
+        title=title,
+        summary=summary,
+        walks=[(name, run_data(log, 0)) for name, log in walks],
+        course=_course(folder / "progress.csv"),
+        sections=[
+            ("These walks", table(("policy", *STRETCH_HEAD), _walks(walks))),
+            ("Verdicts on the way, on flat ground", _verdicts(folder / "verdicts.csv")),
+            ("What made it", facts_table(_facts(folder / "config.json"))),
+        ],
+    )
+
+
+def _walks(walks: Sequence[tuple[str, Log]]) -> list[Row]:
+    return [((name, *cells), None) for name, log in walks for cells, _ in stretches(log, 0)]
+
+
+def _course(progress: Path) -> dict[str, Any]:
+    """What the player draws over the iterations: each of them, and where a stage ends."""
+    rows = read_progress(progress)
+    stages = [row["stage"] for row in rows]
+    iteration = numbers(rows, "iteration", progress)
+    ends = [float(iteration[i]) for i in range(len(rows) - 1) if stages[i] != stages[i + 1]]
+    return {
+        "axis": "iteration",
+        "time": packed(iteration, "f4"),
+        "period": 1,
+        "shifts": ends,
+        "rows": [
+            lines(title, [series(name, factor * numbers(rows, name, progress), "ink")], digits=2)
+            for name, factor, title in COURSES
+        ],
+    }
+
+
+def _verdicts(path: Path) -> str:
+    """The verdicts that the training wrote down on its way, if it did."""
+    if not path.is_file():
+        return ""
+    with path.open(newline="") as file:
+        found = list(csv.DictReader(file))
+    if not found:
+        return ""
+    head = tuple(name.replace("_", " ") for name in found[0])
+    return table(head, [(tuple(str(value) for value in row.values()), None) for row in found])
+
+
+def _facts(path: Path) -> dict[str, str]:
+    """Command, seed and recipe of a run."""
+    try:
+        config = json.loads(path.read_text())
+        recipe = config["recipe"]
+        stages = [f"{stage['name']} {stage['iterations']}" for stage in recipe["stages"]]
+        return {
+            "command": config["command"],
+            "seed": str(config["seed"]),
+            "iterations": ", ".join(stages),
+            "robots × steps an iteration": f"{recipe['robots']} × {recipe['steps']}",
+            **{f"{name} then": str(one) for name, one in config["versions"].items()},
+        }
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise GaitshiftError(f"{path} cannot be read: {error}") from error

@@ -1,0 +1,115 @@
+"""A log as a video: the robot on its ground, and below it what the shift condition sees."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.log import Log
+from gaitshift.robot.description import ROBOTS
+from gaitshift.show.plots.palette import gait_colours
+from gaitshift.show.plots.signals import (
+    check_robot,
+    forward_speed,
+    gait_at,
+    period,
+    smoothed,
+    walks_on_kept_ground,
+    window,
+)
+from gaitshift.show.video.film import FilmWriter
+from gaitshift.show.video.playback import Playback
+from gaitshift.show.video.strip import Reading, Strip
+
+_SPEED_SIGMA = 0.3
+"""Of the window over the speed that is told [s]: a number that trembles cannot be read."""
+
+_SMALLEST = 160
+"""Least width and height [pixel]."""
+
+
+def render(
+    log: Log,
+    path: Path,
+    robot: int = 0,
+    *,
+    width: int = 1280,
+    height: int = 720,
+    fps: int = 30,
+    t0: float = 0.0,
+    t1: float = float("inf"),
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Writes an MP4 video (H.264) of one robot from `t0` to `t1` [s].
+
+    Feet that touch glow in the colour of the gait and leave prints; the strip below tells the gait,
+    k against its threshold, the forward speed and the time. `report` is called with the pictures
+    done and in all.
+
+    Raises:
+        VideoUnavailable: no OpenGL, or no ffmpeg, on this machine.
+        GaitshiftError: no such robot, nothing in that time, a robot whose ground the log does not
+            keep, a size or rate that makes no video, another file ending, or no such folder.
+    """
+    _check_target(path, width, height, fps)
+    _check_log(log, robot)
+    log = window(log, t0, t1)
+    entries = _entries(log, fps)
+    readings = _readings(log, robot)
+    strip = Strip(width, height)
+    with (
+        Playback(log, robot, width, height - strip.height) as playback,
+        FilmWriter(path, width, height, fps) as film,
+    ):
+        for done, entry in enumerate(entries):
+            film.add(np.concatenate([playback.picture(entry), strip.draw(readings[entry])]))
+            report(done + 1, len(entries))
+
+
+def _check_target(path: Path, width: int, height: int, fps: int) -> None:
+    if path.suffix.lower() != ".mp4":
+        raise GaitshiftError(f"{path}: the name of a video ends in .mp4")
+    if not path.parent.is_dir():
+        raise GaitshiftError(f"{path}: there is no folder {path.parent}")
+    if min(width, height) < _SMALLEST or width % 2 or height % 2:
+        raise GaitshiftError(
+            f"a video of {width} × {height} pixels: even numbers from {_SMALLEST} up would be right"
+        )
+    if not 1 <= fps <= 120:
+        raise GaitshiftError(f"{fps} pictures a second: 1 to 120 would be right")
+
+
+def _check_log(log: Log, robot: int) -> None:
+    check_robot(log, robot)
+    if log.robot not in ROBOTS:
+        raise GaitshiftError(f"the log is of a '{log.robot}'; known robots: {', '.join(ROBOTS)}")
+    if not walks_on_kept_ground(log, robot):
+        raise GaitshiftError(
+            f"robot {robot} walked on a ground of its own, and the log keeps the first robot's only"
+        )
+
+
+def _entries(log: Log, fps: int) -> list[int]:
+    """The entry that each picture shows."""
+    times = np.arange(log.time[0], log.time[-1] + 1e-9, 1 / fps)
+    return np.searchsorted(log.time, times - 1e-9).tolist()
+
+
+def _readings(log: Log, robot: int) -> list[Reading]:
+    """What the strip tells at each entry."""
+    colours = gait_colours(log.gaits)
+    speed = smoothed(forward_speed(log, robot), period(log), _SPEED_SIGMA)
+    gaits = [gait_at(log, robot, entry) for entry in range(len(log.time))]
+    return [
+        Reading(
+            gait=gait,
+            colour=colours[gait],
+            k=float(log.k[entry, robot]),
+            threshold=float(log.threshold[entry, robot]),
+            speed=float(speed[entry]),
+            time=float(log.time[entry]),
+            fallen=bool(log.fallen[entry, robot]),
+        )
+        for entry, gait in enumerate(gaits)
+    ]

@@ -1,0 +1,221 @@
+"""Robots that walk now, and take orders between two steps."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gaitshift.control import Autonomous, Driver
+from gaitshift.control.policy import Policy
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine
+from gaitshift.lab.evaluation.demo import RUN_OUT, START, WIDTH, DemoConfig
+from gaitshift.lab.evaluation.rollout import Recorder, RolloutConfig, Walk
+from gaitshift.lab.log import Log
+from gaitshift.robot.description import Robot
+from gaitshift.shift import Condition, GaitGraph
+from gaitshift.show.geometry import Frame, last_touches
+from gaitshift.sim.terrain import from_spec
+from gaitshift.sim.world import World
+
+MOST_ROBOTS = 16
+"""Robots that a page shows at most."""
+
+PUSH_TIME = 0.2
+"""How long a push lasts [s]."""
+
+LYING = 2.0
+"""A robot that fell lies this long before all begin anew [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveConfig:
+    """What walks, on what, and by which rule."""
+
+    track: str = DemoConfig.track
+    """Spec of the ground."""
+    robots: int = 1
+    """The first is the one that charts tell of; the others are its ghosts."""
+    seed: int = 0
+    """Seed of the ground and of the starts."""
+    start: str = "trot"
+    """The gait at the start, and the one for flat ground."""
+    rough_gait: str = "bound"
+    """The gait for rough ground."""
+    condition: Condition = field(default_factory=Condition)
+    """When to shift."""
+    is_autonomous: bool = True
+    """Whether robots shift by themselves."""
+    speed: float | None = None
+    """Commanded speed [m/s]; None: that of the gait."""
+    stride_frequency: float | None = None
+    """Commanded stride frequency [Hz]; None: that of the gait."""
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.robots <= MOST_ROBOTS:
+            raise GaitshiftError(f"{self.robots} robots: 1 to {MOST_ROBOTS} would be right")
+        if self.seed < 0:
+            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+
+    @property
+    def graph(self) -> GaitGraph:
+        """The two gaits and their condition as a graph."""
+        return GaitGraph.of(self.condition, flat=self.start, rough=self.rough_gait)
+
+
+class LiveRun:
+    """N robots on a track. Not for several threads at once."""
+
+    def __init__(self, config: LiveConfig, policies: Mapping[str, Policy]) -> None:
+        """Any of the policies' gaits may be taken up later."""
+        self._policies = dict(policies)
+        self.config = config
+        self._recorder: Recorder | None = None
+        self.restart()
+
+    def restart(self, config: LiveConfig | None = None) -> None:
+        """Begins anew, with another config if one is given; a recording ends.
+
+        Raises:
+            GaitshiftError: the config cannot be had; all stays as it was then.
+        """
+        config = config or self.config
+        ground = from_spec(
+            f"{config.track},flat@{RUN_OUT}", seed=config.seed, length=1.0, width=WIDTH
+        )
+        driver = Driver(self._policies, config.robots, start=config.start)
+        switcher = self._switcher(config)
+        world = World(driver.robot, ground, config.robots, gains=driver.gains)
+        rng = np.random.default_rng(config.seed)
+        start = np.zeros((config.robots, 2))
+        start[:, 0] = START
+        start[1:, 0] += rng.uniform(-0.3, 0.3, config.robots - 1)
+        start[1:, 1] = rng.uniform(-2.0, 2.0, config.robots - 1)
+        self._walk = Walk(
+            world, driver, self._rollout(config), start_xy=start, rng=rng, switcher=switcher
+        )
+        self.config, self._recorder = config, None
+        self.finish_x = ground.extent[1] - RUN_OUT
+        self._touch_w = np.full((config.robots, 4, 3), np.nan)
+        self._pushed_until, self._push_w = 0.0, np.zeros(3)
+        self._fell_at: float | None = None
+        self.ground = ground
+
+    def change(self, config: LiveConfig) -> None:
+        """Goes on with another config, at once; anew where ground, robots or seed are others."""
+        before = self.config
+        anew = ("track", "robots", "seed", "start", "rough_gait")
+        if any(getattr(before, name) != getattr(config, name) for name in anew):
+            self.restart(config)
+            return
+        switcher = self._walk.switcher
+        if config.is_autonomous != before.is_autonomous or not isinstance(switcher, Autonomous):
+            self._walk.switcher = self._switcher(config)
+        elif config.graph.statistics == before.graph.statistics:
+            switcher.retune(config.graph)
+        else:
+            self._walk.switcher = self._switcher(config)
+        self._walk.config = self._rollout(config)
+        self.config = config
+
+    def take(self, gait: str) -> None:
+        """All robots take up a gait at once."""
+        self._walk.driver.switch(np.arange(self.config.robots), gait, self._walk.world.motion)
+
+    def push(self, force: float, direction: float) -> None:
+        """Pushes all bases for `PUSH_TIME`.
+
+        Args:
+            force: [N].
+            direction: in the plane, from the world's x axis [rad].
+        """
+        self._push_w = force * np.array([np.cos(direction), np.sin(direction), 0.0])
+        self._pushed_until = self._walk.time + PUSH_TIME
+
+    def step(self) -> Frame:
+        """One control step."""
+        walk = self._walk
+        pushed = walk.time < self._pushed_until - 1e-9
+        force = np.tile(self._push_w * pushed, (self.config.robots, 1))
+        walk.step(self._see, force)
+        if walk.fallen[0] and self._fell_at is None:
+            self._fell_at = walk.time
+        return self._frame()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the first robot has come to the end, or has lain long enough."""
+        if self._fell_at is not None:
+            return self._walk.time > self._fell_at + LYING
+        return bool(self._walk.world.motion.base_position_w[0, 0] > self.finish_x)
+
+    @property
+    def robot(self) -> Robot:
+        """Which robot walks."""
+        return self._walk.driver.robot
+
+    @property
+    def machines(self) -> dict[str, RewardMachine]:
+        """The machine of each gait."""
+        return {name: policy.machine for name, policy in self._policies.items()}
+
+    @property
+    def gaits(self) -> tuple[str, ...]:
+        """Names of the gaits, by the index that frames use."""
+        return self._walk.driver.gaits
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether steps are kept."""
+        return self._recorder is not None
+
+    def record(self) -> None:
+        """Keeps the steps from now on."""
+        self._recorder = Recorder(self._walk)
+
+    def end_recording(self) -> Log | None:
+        """What was kept; None where nothing was."""
+        recorder, self._recorder = self._recorder, None
+        return recorder.log() if recorder is not None and recorder.steps >= 2 else None
+
+    def _see(self) -> None:
+        motion = self._walk.world.motion
+        self._touch_w = last_touches(self._touch_w, motion.contact, motion.foot_position_w)
+        if self._recorder is not None:
+            self._recorder.add()
+
+    def _frame(self) -> Frame:
+        walk, n = self._walk, self.config.robots
+        motion, decision, driver = walk.world.motion, walk.decision, walk.driver
+        shown = decision if walk.switcher is not None else None
+        nothing = np.zeros(n)
+        return Frame(
+            time=walk.time,
+            qpos=walk.world.state()[0],
+            contact=motion.contact,
+            touch_w=self._touch_w,
+            foot_position_w=motion.foot_position_w,
+            foot_height=np.zeros((n, 4)) if shown is None else shown.foot_height,
+            k=nothing if shown is None else shown.k,
+            threshold=nothing if shown is None else shown.threshold,
+            gait=driver.gait.copy(),
+            machine_state=driver.machine_state.copy(),
+            speed=motion.base_linear_velocity_b[:, 0],
+            fallen=walk.fallen.copy(),
+        )
+
+    def _switcher(self, config: LiveConfig) -> Autonomous | None:
+        missing = {*config.graph.gaits} - {*self._policies}
+        if missing:
+            raise GaitshiftError(f"no policy for the gait '{min(missing)}'")
+        return Autonomous(config.graph, config.robots) if config.is_autonomous else None
+
+    @staticmethod
+    def _rollout(config: LiveConfig) -> RolloutConfig:
+        return RolloutConfig(
+            seconds=np.inf, speed=config.speed, stride_frequency=config.stride_frequency
+        )
+
+
+DIRECTIONS = {"left": np.pi / 2, "right": -np.pi / 2, "forwards": 0.0, "backwards": np.pi}
+"""Of pushes, by name [rad]."""

@@ -1,0 +1,1 @@
+"""The simulation: the ground, MuJoCo's world, the reward, the environment."""

@@ -1,0 +1,67 @@
+"""What an environment is made of, as data."""
+
+from dataclasses import dataclass, field
+
+from gaitshift.control.observation import DEFAULT_SLICES, PAPER_SLICES
+from gaitshift.errors import GaitshiftError
+from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
+from gaitshift.sim.reward import RewardConfig
+from gaitshift.sim.world import PushConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnvConfig:
+    """Everything about the environment but the gait, the ground and the number of robots."""
+
+    reward: RewardConfig = field(default_factory=RewardConfig)
+    """Weights of the one shared reward."""
+    push: PushConfig = field(default_factory=PushConfig)
+    """Disturbances; none by default."""
+    observed: tuple[str, ...] = DEFAULT_SLICES
+    """Slices of the observation, in order."""
+    gains: str = "default"
+    """Preset of the robot's joint gains."""
+    episode_steps: int = 1000
+    """Control steps until an episode is cut (10 s); ours, the paper gives none."""
+    forward_speed: float | None = None
+    """Commanded speed along body x where none is drawn [m/s]; None: the gait's own."""
+    command_share: float = 0.6
+    """Share of the draws of a command that are uniform in the gait's ranges of speed and stride
+    frequency, each by itself; the others are the gait's own. 0: always its own. Ours."""
+    heading_range: float = 0.8
+    """Wanted headings are drawn within ± this of the present line [rad]; 0 leaves the yaw-rate
+    command at zero, as in the paper. Ours."""
+    command_interval: int = 300
+    """Control steps between two draws of the wanted heading, speed and stride frequency; ours."""
+    heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
+    """Turns the wanted heading into the yaw-rate command."""
+    joint_noise: float = 0.1
+    """Joints start within ± this of the stance [rad]; ours."""
+    velocity_noise: float = 0.3
+    """The base starts with a velocity within ± this along x and y [m/s]; ours."""
+    terrain_margin: float = 0.8
+    """A robot nearer than this to the border of its terrain starts anew elsewhere [m]; ours."""
+
+    def __post_init__(self) -> None:
+        if self.episode_steps < 1:
+            raise GaitshiftError(f"episode of {self.episode_steps} steps: at least 1 is needed")
+        if self.forward_speed is not None and not 0 <= self.forward_speed <= MOST_SPEED:
+            raise GaitshiftError(
+                f"commanded speed {self.forward_speed} m/s: 0 to {MOST_SPEED:g} m/s would be right"
+            )
+        if not 0 <= self.command_share <= 1:
+            raise GaitshiftError(f"command_share {self.command_share}: 0 to 1 would be right")
+        if self.command_interval < 1:
+            raise GaitshiftError(f"command_interval {self.command_interval}: at least 1, please")
+
+    @classmethod
+    def paper(cls) -> "EnvConfig":
+        """The paper's environment: Table I and b alone, its S, its gains, no heading command."""
+        return cls(
+            reward=RewardConfig.paper(),
+            observed=PAPER_SLICES,
+            gains="paper",
+            forward_speed=PAPER_SPEED,
+            command_share=0.0,
+            heading_range=0.0,
+        )

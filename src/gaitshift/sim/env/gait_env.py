@@ -1,0 +1,283 @@
+"""The environment: one control step, told as the paper tells it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from jaxtyping import Bool, Float, Float32, Int
+
+from gaitshift.control.observation import Observation, Situation, last_touch
+from gaitshift.gait import RewardMachine
+from gaitshift.robot.command import ACTION_LIMIT
+from gaitshift.robot.description import ANYMAL_B, Robot
+from gaitshift.robot.motion import Motion
+from gaitshift.sim.env.commander import Commander
+from gaitshift.sim.env.config import EnvConfig
+from gaitshift.sim.env.mixed_start import MixedStart, mix
+from gaitshift.sim.env.swings import Swings
+from gaitshift.sim.reward import earned_bonus, walk_reward, with_bonus
+from gaitshift.sim.terrain import Terrain
+from gaitshift.sim.world import Pusher, World
+
+Observations = Float32[np.ndarray, "N D"]
+
+
+class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
+    """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
+
+    An episode ends when the body touches the ground or the machine accepts, and is cut after
+    `episode_steps` or at the border of the terrain. Robots restart in the same step
+    (`AutoresetMode.SAME_STEP`); the observation that ended an episode is in `info["final_obs"]`,
+    where `info["_final_obs"]` holds.
+    `info["reward_terms"]` has each weighted term of R_walk, `info["bonus"]` what the machine added,
+    `info["changed"]` says where it changed its state.
+    """
+
+    def __init__(
+        self,
+        machine: RewardMachine,
+        terrain: Terrain | Sequence[Terrain],
+        num_envs: int = 1,
+        *,
+        config: EnvConfig | None = None,
+        robot: Robot = ANYMAL_B,
+        threads: int = 0,
+    ) -> None:
+        self.config = EnvConfig() if config is None else config
+        self.machine = machine
+        self.robot = robot
+        self.num_envs = num_envs
+        self.observe = Observation(machine, self.config.observed)
+        self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
+        self.strictness = 1.0
+        """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
+        depends on swing heights and punctuality, and factor on the price of chatter."""
+        self.swing_factor = 1.0
+        """Factor on the machine's swing heights now."""
+        self.command_scale = 1.0
+        """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
+        self.penalty_scale = 1.0
+        """The factor λ on all penalties now, 0 to 1 (paper III-D, where it is always 1)."""
+        self.mixed_starts = 0.0
+        """The share of episodes that begin in the midst of a stride that is no gait's (`mix`), of
+        those that begin while others go on."""
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
+        self.single_observation_space = gym.spaces.Box(
+            -np.inf, np.inf, (self.observe.size,), np.float32
+        )
+        self.single_action_space = gym.spaces.Box(-ACTION_LIMIT, ACTION_LIMIT, (12,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._stance = robot.stance_angles
+        self._start(np.random.default_rng())
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Starts every episode anew. The same seed gives the same bits ever after."""
+        if seed is not None:
+            self._start(np.random.default_rng(seed))
+        self._restart(np.arange(self.num_envs))
+        return self._observation(), {}
+
+    def step(
+        self, actions: Float[np.ndarray, "N 12"]
+    ) -> tuple[
+        Observations,
+        Float[np.ndarray, " N"],
+        Bool[np.ndarray, " N"],
+        Bool[np.ndarray, " N"],
+        dict[str, Any],
+    ]:
+        """One control step of 10 ms; `actions` scale to joint targets about the stance."""
+        action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
+        self.world.push(self._pusher.step())
+        motion = self.world.step(self._stance + self.robot.action_scale * action)
+        dwell = self.machine.dwell_for(self._commander.command.stride)
+        step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
+        on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
+        chatter, swing_share = self._swings.see(self._state, step, motion, self.swing_factor)
+        self._touch_height = last_touch(motion, self._touch_height)
+        self._state = step.state
+        self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
+        agreement = self.machine.agreement(self._state, motion.contact)
+        terms = walk_reward(
+            self.config.reward,
+            motion,
+            self._commander.command,
+            stance=self._stance,
+            agreement=agreement,
+            chatter=self.strictness * chatter,
+            action_change=action - self._last_action,
+            penalty_scale=self.penalty_scale,
+        )
+        bonus = earned_bonus(
+            self.config.reward,
+            step.bonus,
+            swing_share=swing_share,
+            on_time=on_time,
+            strictness=self.strictness,
+        )
+        walk = np.sum(list(terms.values()), axis=0)
+        reward = with_bonus(self.config.reward, walk, bonus)
+        self._last_action = action
+        self._age += 1
+        info = {
+            "reward_terms": terms,
+            "bonus": reward - walk,
+            "changed": step.changed,
+            "shows_stance": agreement == 1.0,
+            "forward_speed": motion.base_linear_velocity_b[:, 0],
+        }
+        terminated = motion.body_contact | np.isin(self._state, self.machine.accepting)
+        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(motion)
+        truncated &= ~terminated
+        observation = self._next_observation(terminated | truncated, info)
+        return observation, reward, terminated, truncated, info
+
+    def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
+        """Exchanges the ground under the robots, which go on as they moved.
+
+        Several grounds are shared out as in `World`; they cover the same rectangle.
+        """
+        self.world.set_terrain(terrain)
+
+    def push_at_most(self, force: float) -> None:
+        """Sets the largest push on a base [N] from now on; 0 ends the pushes."""
+        self.config = replace(self.config, push=replace(self.config.push, force=force))
+        self._pusher = Pusher(self.config.push, self.num_envs, self._rng)
+
+    def spread_ages(self) -> None:
+        """Draws the present age of every episode, so that not all are cut in the same step."""
+        self._age = self._rng.integers(0, self.config.episode_steps, self.num_envs)
+
+    def _start(self, rng: np.random.Generator) -> None:
+        n = self.num_envs
+        self._rng = rng
+        self._pusher = Pusher(self.config.push, n, rng)
+        self._state: Int[np.ndarray, " N"] = np.full(n, self.machine.initial)
+        self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._swings = Swings(self.machine, n)
+        self._touch_height: Float[np.ndarray, "N 4"] = np.zeros((n, 4))
+        self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
+        self._commander = Commander(self.machine, self.config, n, rng)
+
+    def _next_observation(self, done: Bool[np.ndarray, " N"], info: dict[str, Any]) -> Observations:
+        self._update_command()
+        observation = self._observation()
+        ids = np.flatnonzero(done)
+        if ids.size == 0:
+            return observation
+        info["final_obs"], info["_final_obs"] = observation, done
+        self._restart(ids)
+        return self._observation()
+
+    def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
+        rng, config, count = self._rng, self.config, len(ids)
+        moving, start = self._draw_mixed(ids)
+        yaw = rng.choice((0.0, np.pi), count)  # edges lie across x: up and down, head on
+        velocity = np.zeros((count, 3))
+        velocity[:, :2] = rng.uniform(-config.velocity_noise, config.velocity_noise, (count, 2))
+        noise = rng.uniform(-config.joint_noise, config.joint_noise, (count, 12))
+        self.world.place(
+            ids,
+            xy=self._starting_points(count),
+            yaw=yaw,
+            joint_position=self._stance + noise,
+            base_velocity_w=velocity,
+        )
+        self._pusher.clear(ids)
+        self._state[ids] = self.machine.initial
+        self._steps_in_state[ids] = 0
+        self._swings.restart(ids)
+        self._touch_height[ids] = last_touch(self.world.motion)[ids]
+        self._age[ids] = 0
+        self._last_action[ids] = 0.0
+        if start is not None:
+            self._set_going(moving, start, yaw[np.isin(ids, moving)])
+        self._commander.restart(ids, yaw, self.command_scale)
+        self._update_command()
+
+    def _draw_mixed(
+        self, ids: Int[np.ndarray, " K"]
+    ) -> tuple[Int[np.ndarray, " M"], MixedStart | None]:
+        """Which of the robots that start anew do so on their way, and how."""
+        moving = ids[:0]
+        if self.mixed_starts > 0 and len(ids) < self.num_envs:
+            moving = ids[self._rng.random(len(ids)) < self.mixed_starts]
+        if moving.size == 0:
+            return moving, None
+        others = np.setdiff1d(np.arange(self.num_envs), ids)
+        return moving, mix(
+            self.world.motion,
+            self._last_action,
+            self._touch_height,
+            among=others,
+            count=len(moving),
+            rng=self._rng,
+        )
+
+    def _set_going(
+        self, ids: Int[np.ndarray, " M"], start: MixedStart, yaw: Float[np.ndarray, " M"]
+    ) -> None:
+        """Robots that stand at their starting points go on as if they had been on their way."""
+        turn = yaw - start.yaw
+        c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
+        self.world.place(
+            ids,
+            xy=self.world.motion.base_position_w[ids, :2],
+            yaw=turn,
+            attitude=start.attitude,
+            joint_position=start.joint_position,
+            joint_velocity=start.joint_velocity,
+            base_velocity_w=np.stack((c * x - s * y, s * x + c * y, z), axis=-1),
+            base_angular_velocity_b=start.base_angular_velocity_b,
+        )
+        self._state[ids] = self.machine.enter(start.contact)
+        self._last_action[ids] = start.last_action
+        self._touch_height[ids] = start.touch_height
+
+    def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
+        if self._is_level:
+            return np.zeros((count, 2))
+        x0, x1, y0, y1 = self.world.terrains[0].extent
+        inset = 2 * self.config.terrain_margin
+        low = (min(x0 + inset, (x0 + x1) / 2), min(y0 + inset, (y0 + y1) / 2))
+        high = (max(x1 - inset, (x0 + x1) / 2), max(y1 - inset, (y0 + y1) / 2))
+        return self._rng.uniform(low, high, (count, 2))
+
+    def _left_terrain(self, motion: Motion) -> Bool[np.ndarray, " N"]:
+        if self._is_level:
+            return np.zeros(self.num_envs, dtype=bool)
+        inside = self.world.terrains[0].contains
+        return ~inside(motion.base_position_w[:, :2], self.config.terrain_margin)
+
+    @property
+    def _is_level(self) -> bool:
+        """Whether no robot's ground has a border: level ground goes on for ever."""
+        return all(terrain.is_flat for terrain in self.world.terrains)
+
+    def _update_command(self) -> None:
+        self._commander.update(self._age, self.world.motion.yaw, self.command_scale)
+
+    def commands(self) -> dict[str, Any]:
+        """What may be commanded: own value and range of forward speed and stride frequency."""
+        return self._commander.ranges()
+
+    def _observation(self) -> Observations:
+        return self.observe(
+            Situation(
+                machine_state=self._state,
+                steps_in_state=self._steps_in_state,
+                motion=self.world.motion,
+                command=self._commander.command,
+                last_action=self._last_action,
+                stance=self._stance,
+                touch_height=self._touch_height,
+            )
+        )

@@ -1,0 +1,53 @@
+"""What becomes of each foot between the moment the machine lifts it and its touchdown."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.gait import RewardMachine, Step
+from gaitshift.robot.motion import Motion
+
+
+class Swings:
+    """The swings of N robots' feet: how high they went, and touchdowns out of place.
+
+    At the start of an episode every foot may land once, and is taken for high enough.
+    """
+
+    def __init__(self, machine: RewardMachine, n: int) -> None:
+        self._machine = machine
+        self._height: Float[np.ndarray, "N 4"] = np.empty((n, 4))
+        self._touches: Bool[np.ndarray, "N 4"] = np.empty((n, 4), dtype=bool)
+        self._may_land: Bool[np.ndarray, "N 4"] = np.empty((n, 4), dtype=bool)
+        self.restart(np.arange(n))
+
+    def restart(self, ids: Int[np.ndarray, " K"]) -> None:
+        """Episodes of these robots begin."""
+        self._height[ids] = np.inf
+        self._touches[ids] = False
+        self._may_land[ids] = True
+
+    def see(
+        self, left: Int[np.ndarray, " N"], step: Step, motion: Motion, factor: float = 1.0
+    ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+        """Number of touchdowns out of place, and share of the swing height that was reached.
+
+        In place is one touchdown after the machine has lifted the foot, in a state that has it in
+        its stance or in the state before. The share is that of the edge taken, 1 where there is
+        none.
+
+        Args:
+            left: state in which the machine was.
+            step: what its step did.
+            motion: the motion after the step.
+            factor: on the machine's swing heights.
+        """
+        lands = motion.contact & ~self._touches
+        in_place = lands & self._may_land & self._machine.expected(left)
+        height = np.fmax(self._height, motion.clearance)
+        lifted = self._machine.lifted(left, step.state)
+        self._touches = motion.contact.copy()
+        self._may_land = (self._may_land & ~in_place) | lifted
+        self._height = np.where(lifted, motion.clearance, height)
+        return (lands & ~in_place).sum(axis=1), self._machine.swing_share(
+            step.edge, height / factor
+        )

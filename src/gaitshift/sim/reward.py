@@ -1,0 +1,183 @@
+"""The reward: Table I term by term, additions of ours, and the machine's bonus."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.robot.command import Command
+from gaitshift.robot.motion import Motion
+
+BonusMode = Literal["add", "multiply_clipped", "multiply"]
+BONUS_MODES: tuple[BonusMode, ...] = ("add", "multiply_clipped", "multiply")
+
+TRACKING_WIDTH = 0.25
+"""Width of `speed_tracking` [m/s]; ours: about the swing of v_x within a stride."""
+
+ADDITIONS = (
+    "speed_tracking",
+    "stance_feet",
+    "stance_pattern",
+    "slip",
+    "power",
+    "chatter",
+    "action_rate",
+)
+"""The terms that are ours; every other one is Table I's."""
+
+BONUS_SHARES = ("bonus_swing", "bonus_punctuality")
+"""What makes the bonus depend on how a change came about; ours."""
+
+RewardTerms = dict[str, Float[np.ndarray, " N"]]
+"""The weighted terms of R_walk by name, each (N,)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RewardConfig:
+    """Weights of the reward. One reward for all gaits (paper III-C)."""
+
+    forward_velocity: float = 10.0
+    """Times exp(-(v_d - v_x)²) [s²/m²] (Table I)."""
+    lateral_velocity: float = -10.0
+    """Times v_y² + v_z² [s²/m²] (Table I)."""
+    roll_pitch_rate: float = -0.1
+    """Times ω_x² + ω_y² [s²] (Table I)."""
+    yaw_rate: float = -25.0
+    """Times (ω_z - commanded ω_z)² [s²] (Table I, where the command is always 0)."""
+    torque: float = -4e-5
+    """Times ‖τ‖² [1/(N·m)²] (Table I)."""
+    joint_position: float = -0.1
+    """Times ‖q - q_init‖² (Table I)."""
+    joint_velocity: float = -0.01
+    """Times ‖q̇‖² [s²] (Table I)."""
+    speed_tracking: float = 15.0
+    """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: Table I's bell is so wide that a walk at 1 m/s
+    in place of 1.2 m/s loses 4 % of it."""
+    stance_feet: float = 12.0
+    """Times the share of the feet that are, down or up, as the stance of the present state has
+    them; ours: the bonus pays the instant of a change only, and this tells each foot apart."""
+    stance_pattern: float = 12.0
+    """Where that share is 1; ours: else three right feet out of four would do."""
+    slip: float = -0.5
+    """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
+    power: float = -0.0225
+    """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
+    chatter: float = -80.0
+    """Times the feet that come down out of place (twice in a swing, or states too early), and the
+    environment's strictness; ours: one touchdown a swing is clean, and free at any frequency."""
+    action_rate: float = -0.02
+    """Times ‖a - a_last‖²; ours: smooth targets."""
+    bonus: float = 200.0
+    """b, paid when the machine changes its state (paper III-C)."""
+    bonus_swing: float = 1.0
+    """Share of the bonus that is paid by the height of the swing alone, times the environment's
+    strictness; ours: without it feet drag."""
+    bonus_punctuality: float = 1.0
+    """Share of the bonus that is paid for being on time alone, times the environment's strictness;
+    ours: a stride follows its commanded frequency, and its halves are of one length."""
+    bonus_mode: BonusMode = "add"
+    """How b meets R_walk; ours is `add`, because `multiply` punishes a good change while R_walk is
+    negative (docs/paper.md)."""
+
+    def __post_init__(self) -> None:
+        if self.bonus_mode not in BONUS_MODES:
+            raise GaitshiftError(
+                f"unknown bonus mode '{self.bonus_mode}'; known: {', '.join(BONUS_MODES)}"
+            )
+
+    @classmethod
+    def paper(cls, bonus_mode: BonusMode = "add") -> "RewardConfig":
+        """Table I and b = 200 alone."""
+        return cls(**dict.fromkeys((*ADDITIONS, *BONUS_SHARES), 0.0), bonus_mode=bonus_mode)
+
+
+def walk_reward(
+    config: RewardConfig,
+    motion: Motion,
+    command: Command,
+    *,
+    stance: Float[np.ndarray, " 12"],
+    agreement: Float[np.ndarray, " N"],
+    chatter: Float[np.ndarray, " N"],
+    action_change: Float[np.ndarray, "N 12"],
+    penalty_scale: float = 1.0,
+) -> RewardTerms:
+    """R_walk, term by term (Table I and the additions).
+
+    Args:
+        config: the weights.
+        motion: the motion after the step.
+        command: what was asked for.
+        stance: q_init [rad].
+        agreement: share of the feet that are as the stance of the machine's state has them.
+        chatter: number of feet that came down out of place, times the present strictness.
+        action_change: action minus the action before it.
+        penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
+    """
+    velocity = motion.base_linear_velocity_b
+    rate = motion.base_angular_velocity_b
+    sideways = velocity[:, 1:]
+    speed_error_squared = np.square(command.forward_speed - velocity[:, 0])
+    foot_speed_squared = _squares(motion.foot_velocity_w[..., :2])
+    terms = {
+        "forward_velocity": config.forward_velocity * np.exp(-speed_error_squared),
+        "lateral_velocity": config.lateral_velocity * _squares(sideways),
+        "roll_pitch_rate": config.roll_pitch_rate * _squares(rate[:, :2]),
+        "yaw_rate": config.yaw_rate * np.square(rate[:, 2] - command.yaw_rate),
+        "torque": config.torque * _squares(motion.joint_torque),
+        "joint_position": config.joint_position * _squares(motion.joint_position - stance),
+        "joint_velocity": config.joint_velocity * _squares(motion.joint_velocity),
+        "speed_tracking": config.speed_tracking * np.exp(-speed_error_squared / TRACKING_WIDTH**2),
+        "stance_feet": config.stance_feet * agreement,
+        "stance_pattern": config.stance_pattern * (agreement == 1.0),
+        "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
+        "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
+        "chatter": config.chatter * chatter,
+        "action_rate": config.action_rate * _squares(action_change),
+    }
+    return {
+        name: penalty_scale * term if getattr(config, name) < 0 else term
+        for name, term in terms.items()
+    }
+
+
+def earned_bonus(
+    config: RewardConfig,
+    bonus: Float[np.ndarray, " N"],
+    *,
+    swing_share: Float[np.ndarray, " N"],
+    on_time: Float[np.ndarray, " N"],
+    strictness: float,
+) -> Float[np.ndarray, " N"]:
+    """The edges' factors of the bonus, in the part that the manner of the change has earned.
+
+    Args:
+        config: the weights.
+        bonus: the edge's own factor, 0 where the machine stayed.
+        swing_share: share of the swing height that was reached, in [0, 1].
+        on_time: punctuality of the change, in [0, 1].
+        strictness: how much of both is asked for, in [0, 1].
+    """
+    swing = 1.0 - strictness * config.bonus_swing * (1.0 - swing_share)
+    return bonus * swing * (1.0 - strictness * config.bonus_punctuality * (1.0 - on_time))
+
+
+def with_bonus(
+    config: RewardConfig, walk: Float[np.ndarray, " N"], bonus: Float[np.ndarray, " N"]
+) -> Float[np.ndarray, " N"]:
+    """The reward after δr: R_walk met by b times `bonus` where the machine changed its state.
+
+    `add` adds b, `multiply` multiplies R_walk by b, `multiply_clipped` multiplies max(R_walk, 0).
+    `bonus` is the edge's own factor, 0 where the machine stayed.
+    """
+    paid = config.bonus * bonus
+    if config.bonus_mode == "add":
+        return walk + paid
+    base = np.maximum(walk, 0.0) if config.bonus_mode == "multiply_clipped" else walk
+    return np.where(bonus > 0, base * paid, walk)
+
+
+def _squares(x: Float[np.ndarray, "*batch n"]) -> Float[np.ndarray, "*batch"]:
+    return np.einsum("...i,...i->...", x, x)

@@ -1,0 +1,210 @@
+"""N robots stepped on all cores: joint targets in, a frozen `Motion` out."""
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+from mujoco.batch import Batch
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.description import Robot
+from gaitshift.robot.motion import Motion, turned
+from gaitshift.sim.terrain import Terrain
+from gaitshift.sim.world.scene import build_model
+
+CONTACT_FORCE = 1.0
+"""A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
+value of legged_gym."""
+
+CLEAR_OF_GROUND = 20.0
+"""Height at which robots are laid out before they are set down [m]; ours."""
+
+_POSE = 7  # position and quaternion in qpos
+_TWIST = 6  # linear and angular velocity in qvel
+
+
+class World:
+    """N robots, each alone on its terrain.
+
+    Robots do not feel each other. With several terrains, robot i stands on terrain i mod K.
+    Between calls nothing moves; `motion` is always the present one, no quantity a step late
+    (forces and torques are those of the last physics step, which led here).
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        terrain: Terrain | Sequence[Terrain],
+        n: int,
+        *,
+        gains: str = "default",
+        threads: int = 0,
+    ) -> None:
+        """Builds the world with all robots in their stance at the origin.
+
+        Args:
+            robot: whose model is simulated.
+            terrain: one for all, or several that the robots share out.
+            n: number of robots.
+            gains: preset of joint gains in `robot.gains`.
+            threads: physics threads, 0 for all cores.
+        """
+        if n < 1:
+            raise GaitshiftError(f"{n} robots: at least 1 would be right")
+        self.robot = robot
+        self.n = n
+        self._gains = robot.gains_of(gains)
+        self._threads = threads
+        self._stance = robot.stance_angles
+        self.set_terrain(terrain)
+        self.place(np.arange(n), xy=np.zeros((n, 2)), yaw=np.zeros(n))
+
+    def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
+        """Exchanges the ground; robots go on as they moved, set down on it where they stood."""
+        terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
+        if not terrains:
+            raise GaitshiftError("no terrain to stand on; give one or more")
+        kept = self._kept_state(terrains) if hasattr(self, "_batch") else None
+        self.terrains = terrains[: self.n]
+        models = [build_model(self.robot, self._gains, ground) for ground in self.terrains]
+        self.model = models[0]
+        self._substeps = round(CONTROL_PERIOD / self.model.opt.timestep)
+        batch = Batch(self.model, self.n, self._threads, True)
+        if len(models) > 1:
+            batch.set_models([models[i % len(models)] for i in range(self.n)])
+        self._batch = batch
+        self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
+        self._ctrl, self._applied = batch.bind("ctrl"), batch.bind("qfrc_applied")
+        self._sensors, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
+        if kept is not None:
+            self._qpos[:], self._qvel[:] = kept
+            self._settle(np.arange(self.n))
+
+    def place(
+        self,
+        ids: Int[np.ndarray, " K"],
+        *,
+        xy: Float[np.ndarray, "K 2"],
+        yaw: Float[np.ndarray, " K"],
+        attitude: Float[np.ndarray, "K 4"] | None = None,
+        joint_position: Float[np.ndarray, "K 12"] | None = None,
+        joint_velocity: Float[np.ndarray, "K 12"] | None = None,
+        base_velocity_w: Float[np.ndarray, "K 3"] | None = None,
+        base_angular_velocity_b: Float[np.ndarray, "K 3"] | None = None,
+    ) -> None:
+        """Sets robots down with the lowest foot on the ground, at rest in their stance.
+
+        Args:
+            ids: which, in rising order.
+            xy: of the base [m].
+            yaw: that the base is turned by [rad].
+            attitude: before that turn (w, x, y, z); upright if not given.
+            joint_position: [rad]; the stance if not given.
+            joint_velocity: [rad/s]; 0 if not given, as are the velocities of the base.
+            base_velocity_w: [m/s].
+            base_angular_velocity_b: [rad/s].
+        """
+        qpos = np.zeros((len(ids), _POSE + 12))
+        qpos[:, :2] = xy
+        qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
+        upright = np.tile((1.0, 0.0, 0.0, 0.0), (len(ids), 1))
+        qpos[:, 3:_POSE] = turned(upright if attitude is None else attitude, yaw)
+        qpos[:, _POSE:] = self._stance if joint_position is None else joint_position
+        self._batch.reset(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+        self._qpos[ids] = qpos
+        self._qvel[ids] = 0.0
+        for part, given in (
+            (slice(0, 3), base_velocity_w),
+            (slice(3, _TWIST), base_angular_velocity_b),
+            (slice(_TWIST, None), joint_velocity),
+        ):
+            if given is not None:
+                self._qvel[ids, part] = given
+        self._batch.forward(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_POS))
+        feet = self._feet(self._sensors[ids])
+        below = (feet[..., 2] - self._ground(feet[..., :2], ids)).min(axis=1)
+        self._qpos[ids, 2] -= below
+        self._settle(ids)
+
+    def push(self, force_w: Float[np.ndarray, "N 3"]) -> None:
+        """Forces on the base origins, world frame [N], until the next call or `place`."""
+        self._applied[:, :3] = force_w
+
+    def step(self, target: Float[np.ndarray, "N 12"]) -> Motion:
+        """One control step: joints are driven to `target` [rad], the physics moves on 10 ms.
+
+        Raises:
+            GaitshiftError: a target is not finite; nothing has moved then.
+        """
+        if not np.isfinite(target).all():
+            bad = int(np.flatnonzero(~np.isfinite(target).all(axis=1))[0])
+            joint = self.robot.joint_names[int(np.flatnonzero(~np.isfinite(target[bad]))[0])]
+            raise GaitshiftError(
+                f"joint target of robot {bad}, {joint}, is not a number; nothing was moved"
+            )
+        self._ctrl[:] = target
+        self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
+        self.motion = self._measure()
+        return self.motion
+
+    def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
+        """Copies of qpos and qvel, as logs and videos want them."""
+        return self._qpos.copy(), self._qvel.copy()
+
+    def _measure(self) -> Motion:
+        qpos, qvel, sensors = self._qpos, self._qvel, self._sensors
+        feet = self._feet(sensors)
+        force = sensors[:, 24:28].copy()
+        return Motion(
+            joint_position=qpos[:, _POSE:].copy(),
+            joint_velocity=qvel[:, _TWIST:].copy(),
+            joint_torque=self._torque.copy(),
+            base_position_w=qpos[:, :3].copy(),
+            base_quaternion_w=qpos[:, 3:_POSE].copy(),
+            base_linear_velocity_w=qvel[:, :3].copy(),
+            base_angular_velocity_b=qvel[:, 3:_TWIST].copy(),
+            foot_position_w=feet,
+            foot_velocity_w=sensors[:, 12:24].reshape(-1, 4, 3).copy(),
+            foot_force=force,
+            contact=force > CONTACT_FORCE,
+            clearance=feet[..., 2] - self._ground(feet[..., :2], None),
+            body_contact=sensors[:, 28] > 0.0,
+        )
+
+    def _feet(self, sensors: Float[np.ndarray, "K S"]) -> Float[np.ndarray, "K 4 3"]:
+        """Lowest points of the feet [m]: the sensors give the centres of the spheres."""
+        feet = sensors[:, :12].reshape(-1, 4, 3).copy()
+        feet[..., 2] -= self.robot.foot_radius
+        return feet
+
+    def _ground(
+        self, xy: Float[np.ndarray, "K 4 2"], ids: Int[np.ndarray, " K"] | None
+    ) -> Float[np.ndarray, "K 4"]:
+        """Height of the ground under world points of these robots (None: of all) [m]."""
+        if len(self.terrains) == 1:
+            return self.terrains[0].height_at(xy)
+        which = (np.arange(self.n) if ids is None else ids) % len(self.terrains)
+        height = np.empty(xy.shape[:-1])
+        for index, terrain in enumerate(self.terrains):
+            height[which == index] = terrain.height_at(xy[which == index])
+        return height
+
+    def _settle(self, ids: Int[np.ndarray, " K"]) -> None:
+        """Makes every measured quantity of these robots current."""
+        self._ctrl[ids] = self._qpos[ids, _POSE:]
+        self._applied[ids] = 0.0
+        self._batch.forward(ids=ids)
+        self.motion = self._measure()
+
+    def _kept_state(
+        self, terrains: tuple[Terrain, ...]
+    ) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
+        """The present state, lifted or lowered so that no foot stands deeper than before."""
+        qpos, qvel = self.state()
+        feet = self.motion.foot_position_w[..., :2]
+        before = self._ground(feet, None)
+        self.terrains = terrains[: self.n]
+        qpos[:, 2] += (self._ground(feet, None) - before).max(axis=1)
+        return qpos, qvel

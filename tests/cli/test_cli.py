@@ -1,0 +1,284 @@
+"""The command line as its users meet it: results on stdout, one clear line for a fault, codes."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gaitshift.cli import main
+from gaitshift.control import policy
+from gaitshift.gait import gaits
+from gaitshift.lab.log import Log
+
+TINY = ["--robots", "4", "--iterations", "2"]
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The one line with which a command refuses."""
+    with pytest.raises(SystemExit) as exit_:
+        main(list(arguments))
+    said = capsys.readouterr()
+    assert exit_.value.code == 2
+    assert said.out == ""
+    lines = said.err.strip().splitlines()
+    assert len(lines) == 1, said.err
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["train", "trt"], "did you mean 'trot'"),
+        (["train", "none.toml"], "none.toml"),
+        (["train"], "which gait?"),
+        (["train", "trot", "--robots", "-3"], "robots = -3: 1 to 65536"),
+        (["train", "trot", "--iterations", "0"], "0 iterations: at least 1"),
+        (["train", "trot", "--seed", "-1"], "seed -1"),
+        (["train", "--resume", "nowhere"], "not a training run"),
+        (["train", "trot", "--resume", "nowhere"], "not both"),
+        (["evaluate", "canter"], "no policy 'canter'; shipped: "),
+        (["evaluate", "none.onnx"], "no policy file none.onnx"),
+        (["evaluate", "trot", "--terrain", "lava"], "there is no ground called 'lava'"),
+        (["evaluate", "trot", "--terrain", "perlin:-1"], "perlin:-1"),
+        (["evaluate", "trot", "--episodes", "0"], "0 episodes: 1 to 100000"),
+        (["evaluate", "trot", "--seconds", "nan"], "nan seconds"),
+        (["evaluate", "trot", "--push", "-5"], "push of -5.0 N: a force from 0 to 1000 N"),
+        (["evaluate", "trot", "--speed", "3.5"], "3.5 m/s: 0 to 3 m/s"),
+        (["evaluate", "trot", "--stride-frequency", "0"], "0.0 Hz: more than 0, up to 100 Hz"),
+        (["gaits", "canter"], "gaits are bound, gallop, half_bound, pace, pronk"),
+        (["demo", "--flat-gait", "canter"], "no policy 'canter'"),
+        (["demo", "--track", "flat@2,perlin@2"], "perlin@2"),
+        (["demo", "--gaits", "trot,bound", "--at", "1,x"], "times '1,x': numbers"),
+        (["demo", "--alpha", "-1"], "alpha"),
+        (["demo", "--rough-gait", "trot"], "both 'trot'"),
+        (["bench", "--robots", "0"], "robots from 1"),
+        (["train", "trot", "--robots", "many"], "--robots"),
+        (["demo", "--episodes", "1.5"], "invalid literal for int() with base 10: '1.5'"),
+        (["demo", "--speed", "3"], "--speed"),
+        (["evaluate"], "Missing"),
+        (["evaluat"], "evaluat"),
+    ],
+)
+def test_a_fault_of_the_user_is_one_line_that_says_what_would_be_right(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert says in refusal(capsys, *arguments)
+    assert list(tmp_path.iterdir()) == []  # and nothing was left behind
+
+
+def test_each_fault_of_a_machine_file_is_named_with_the_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = (Path(gaits.__file__).parent / "trot.toml").read_text()
+    for old, new, says in (
+        ('down = ["FR", "BL"]', 'down = ["RF", "BL"]', "RF"),
+        ('to = "FR_BL"', 'to = "elsewhere"', "elsewhere"),
+        ("dwell = 20 ", "dwell = -20 ", "-20"),
+        ("dwell = 20 ", "dwell = ] ", "line"),
+    ):
+        assert old in text
+        path = tmp_path / "mine.toml"
+        path.write_text(text.replace(old, new, 1))
+        line = refusal(capsys, "train", str(path), "--out", str(tmp_path / "run"))
+        assert "mine.toml" in line
+        assert says in line
+        assert not (tmp_path / "run").exists()
+
+
+def test_a_truncated_policy_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = tmp_path / "trot.onnx"
+    path.write_bytes(policy.load("trot").path.read_bytes()[:20_000])
+    assert "trot.onnx is not a whole ONNX file" in refusal(capsys, "evaluate", str(path))
+
+
+def test_an_output_folder_with_other_content_is_left_alone(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    mine = tmp_path / "thesis.tex"
+    mine.write_text("years of work")
+    out = str(tmp_path)
+    for command in (["demo"], ["train", "trot", *TINY], ["gaits", "trot"]):
+        assert "--overwrite" in refusal(capsys, *command, "--out", out)
+    assert "not overwritten" in refusal(capsys, "train", "trot", *TINY, "--out", out, "--overwrite")
+    assert "exists" in refusal(capsys, "evaluate", "trot", "--log", str(mine))
+    assert mine.read_text() == "years of work"
+    assert list(tmp_path.iterdir()) == [mine]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["train", "--resume", "file"], "file is not a training run"),
+        (["train", "trot", *TINY, "--out", "file/x"], "file/x: Not a directory"),
+        (["gaits", "--out", "file/x"], "file/x: Not a directory"),
+        (["evaluate", "trot", "--log", "file/x.npz"], "file: File exists"),
+        (
+            ["evaluate", "trot", "--log", ".", "--overwrite"],
+            ". is a folder; give a file with --log",
+        ),
+        (["reproduce", "--runs", "file/x"], "file is a file"),
+    ],
+)
+def test_a_file_where_a_folder_should_be_is_one_line_before_any_work(
+    arguments: list[str], says: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
+) -> None:
+    def work(*_: object, **__: object) -> None:
+        raise AssertionError("there was work")
+
+    monkeypatch.setattr("gaitshift.cli.evaluate.evaluate", work)
+    monkeypatch.setattr("gaitshift.learn.run.Run.__init__", work)
+    monkeypatch.chdir(tmp_path)
+    Path("file").write_text("years of work")
+    assert says in refusal(capsys, *arguments)
+    assert Path("file").read_text() == "years of work"
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_a_full_disk_is_one_line_with_the_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch
+) -> None:
+    def full(self: Log, path: Path) -> None:
+        raise OSError(28, "No space left on device", str(path))
+
+    monkeypatch.setattr(Log, "save", full)
+    path = tmp_path / "walk.npz"
+    with pytest.raises(SystemExit) as exit_:
+        main(["evaluate", "trot", "--episodes", "1", "--seconds", "0.1", "--log", str(path)])
+    assert exit_.value.code == 2
+    assert capsys.readouterr().err.strip() == f"gaitshift: {path}: No space left on device"
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_reader_that_has_seen_enough_is_no_fault(unbuffered: str) -> None:
+    """Its end of the pipe is closed before anything is written."""
+    command = [sys.executable, "-m", "gaitshift", "gaits", "--json"]
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True
+    ) as process:
+        assert process.stdout
+        assert process.stderr
+        process.stdout.close()
+        said = process.stderr.read()
+    assert (process.returncode, said) == (0, "")
+
+
+def test_a_pipe_that_breaks_elsewhere_is_told(tmp_path: Path) -> None:
+    program = """
+from gaitshift.cli import main
+from gaitshift.cli.gaits import Gaits
+def broken(self):
+    raise BrokenPipeError(32, "Broken pipe")
+Gaits.run = broken
+main(["gaits"])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr.strip()) == (2, "gaitshift: Broken pipe")
+
+
+def test_json_is_one_object_and_nothing_else_on_stdout(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    main(["gaits", "--json"])
+    assert set(json.loads(capsys.readouterr().out)) == set(gaits.names())
+    log = tmp_path / "run.npz"
+    arguments = ["--episodes", "4", "--seconds", "0.5", "--json", "--log", str(log)]
+    main(["evaluate", "trot", *arguments])
+    figures = json.loads(capsys.readouterr().out)
+    assert figures["gait"] == "trot"
+    assert figures["survival"] == 1.0
+    assert Log.load(log).qpos.shape == (50, 4, 19)
+
+
+def test_gaits_are_listed_drawn_and_printed_as_mermaid(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    main(["gaits"])
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in gaits.names())
+    main(["gaits", "trot", "--out", str(tmp_path)])
+    assert capsys.readouterr().out.startswith("stateDiagram-v2")
+    assert (tmp_path / "trot.png").stat().st_size > 5_000
+
+
+def test_the_demo_writes_what_it_says(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "demo"
+    main(["demo", "--track", "flat@2,flat@2", "--no-video", "--out", str(out)])
+    printed = capsys.readouterr().out
+    assert {path.name for path in out.iterdir()} == {
+        "index.html",
+        "demo.png",
+        "log.npz",
+        "summary.json",
+    }
+    assert str(out) in printed
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["survived"] is True
+    assert summary["switches"] == []
+    assert 2.0 < summary["distance_m"] < 3.0
+    log = Log.load(out / "log.npz")
+    assert log.gaits == ("trot", "bound")
+    assert np.all(np.diff(log.time) > 0)
+
+
+def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    main(["train", "trot", *TINY, "--out", str(out), "--json"])
+    row = json.loads(capsys.readouterr().out)
+    assert row["iteration"] == 2
+    names = {path.name for path in out.iterdir()}
+    assert {"config.json", "progress.csv", "checkpoints", "policy.onnx", "tensorboard"} <= names
+    assert row["verdict"]["gait"] == "none"
+    assert row["verdict"]["clean"] is False
+    assert (out / "verdicts.csv").read_text().splitlines()[-1].startswith("2,none,False,")
+    main(["train", "--resume", str(out), "--json"])
+    assert json.loads(capsys.readouterr().out) == row, "a run that is over tells the same again"
+    main(["evaluate", row["policy"], "--episodes", "2", "--seconds", "0.2", "--json"])
+    assert json.loads(capsys.readouterr().out)["episodes"] == 2
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_a_run_that_goes_on(tmp_path: Path) -> None:
+    """Interrupted in a training: exit code 130, no traceback, and --resume ends it."""
+    out = tmp_path / "run"
+    command = [
+        sys.executable,
+        "-m",
+        "gaitshift",
+        "train",
+        "trot",
+        "--robots",
+        "8",
+        "--out",
+        str(out),
+    ]
+    progress = out / "progress.csv"
+    deadline = time.monotonic() + 120
+    with subprocess.Popen(
+        [*command, "--iterations", "40"], stderr=subprocess.PIPE, env=os.environ, text=True
+    ) as process:
+        try:
+            while not (progress.exists() and len(progress.read_text().splitlines()) > 27):
+                assert process.poll() is None, process.stderr.read()
+                assert time.monotonic() < deadline
+                time.sleep(0.02)
+            process.send_signal(signal.SIGINT)
+            said = process.communicate(timeout=60)[1]
+        finally:
+            process.kill()
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert f"--resume {out}" in said
+    assert policy.load(out / "policy.onnx").gait == "trot"
+    main(["train", "--resume", str(out)])
+    rows = progress.read_text().splitlines()
+    assert [int(row.split(",")[0]) for row in rows[1:]] == list(range(1, 41))

@@ -1,0 +1,461 @@
+"""`gaitshift record` and `gaitshift identify`: robots whose right answer is known by hand."""
+
+import csv
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gaitshift.cli import main
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification import Recording, auc, sources
+from gaitshift.lab.identification.candidates import CANDIDATES
+from gaitshift.lab.identification.classifier import RoughnessClassifier
+from gaitshift.lab.identification.judging import judge, replay_rules
+from gaitshift.lab.identification.passage import passage_scores
+from gaitshift.lab.identification.statistics import auc_interval
+from gaitshift.lab.identification.tuning import as_given, try_grids, tune
+from gaitshift.robot.legs import LEGS
+from gaitshift.shift import Rule
+
+PERIOD = 0.01
+FEET = np.array(
+    [[0.34, 0.21, -0.5], [0.34, -0.21, -0.5], [-0.34, 0.21, -0.5], [-0.34, -0.21, -0.5]]
+)
+
+
+def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
+    """Robots that trot at 1 m/s; from 4 s on the ground under each touch is off by ± noise [m].
+
+    On smooth ground by ± 1 mm, so that no two touches are level.
+    """
+    rng = np.random.default_rng(seed)
+    steps = round(seconds / PERIOD)
+    time = PERIOD * np.arange(1, steps + 1)
+    rough = np.broadcast_to((time > smooth)[:, None], (steps, robots))
+    if noise == 0.0:
+        rough = np.zeros_like(rough)
+    contact = np.empty((steps, robots, 4), dtype=bool)
+    feet = np.empty((steps, robots, 4, 3))
+    for robot in range(robots):
+        for leg in range(4):
+            phase = (time / 0.5 + (0.5 if leg in (1, 2) else 0.0) + 0.1 * robot) % 1.0
+            down = phase < 0.5
+            stride = np.cumsum(np.diff(down.astype(int), prepend=0) == 1)
+            level = rng.choice((-1.0, 1.0), stride[-1] + 1)
+            size = np.where(rough[:, robot], noise, 0.001)
+            contact[:, robot, leg] = down
+            feet[:, robot, leg] = FEET[leg]
+            feet[:, robot, leg, 0] += np.where(down, 0.25 - phase * 0.5, 0.0)
+            feet[:, robot, leg, 2] += np.where(down, level[stride] * size, 0.1)
+    return Recording(
+        name=name,
+        time=time,
+        contact=contact,
+        foot_position_b=feet,
+        gravity_b=np.tile([0.0, 0.0, -1.0], (steps, robots, 1)),
+        rough=rough.copy(),
+        alive=np.ones((steps, robots), dtype=bool),
+        distance=np.tile(time[:, None], (1, robots)),
+    )
+
+
+def tuned_by(candidates, recordings, way):
+    return tune(candidates, try_grids(candidates, recordings, way))
+
+
+def judged_by(tuned, recordings):
+    return judge(tuned, replay_rules(tuned, recordings))
+
+
+def ways():
+    return [march("flat", noise=0.0), march("into", noise=0.04, seed=1)]
+
+
+def height_candidates():
+    return [c for c in CANDIDATES if c.name in ("height_difference", "plane_residual")]
+
+
+# Tuning and judging -------------------------------------------------------------------------------
+
+
+def time_to_fire(tuned):
+    """Until a robot fires whose values are all beyond α [s], step by step."""
+    pairs = {"height_difference": 6, "plane_residual": 1}[tuned.candidate.name]
+    k, steps = np.zeros(1), 0
+    while not tuned.rule.fires(k, np.ones(1))[0]:
+        k, steps = tuned.rule.step(k, np.full((1, pairs), 9.0)), steps + 1
+    return 0.01 * steps
+
+
+def test_numbers_that_are_chosen_notice_noise_and_keep_still_on_smooth_ground():
+    """Touches differ by 2 mm at most on smooth ground, by 8 cm on rough: α lies in between."""
+    tuned = tuned_by(height_candidates(), ways(), way="rough")
+    for one, judged in zip(tuned, judged_by(tuned, ways()), strict=True):
+        assert one.choice.is_free
+        tallies = {course.course: course.tally for course in judged.courses}
+        assert tallies["flat"].fired[0, 0] == 0
+        assert tallies["into"].detected[0, 0] == tallies["into"].came[0, 0] == 3
+        assert 0.0 <= max(judged.courses[1].delays_m) < 1.5, "a stride is half a metre"
+        area = judged.area("into")
+        assert area is not None
+        assert area[0] == 1.0
+        assert judged.area("flat") is None, "nothing to notice there"
+        assert judged.soonest == pytest.approx(time_to_fire(one))
+        way = sum(float(way.distance[-1].sum()) for way in ways())
+        time = sum(len(way.time) * way.period * way.robots for way in ways())
+        assert judged.speed == pytest.approx(way / time)
+    assert 0.002 < tuned[0].choice.alpha < 0.08
+
+
+def test_judging_replays_what_a_live_condition_does():
+    """The delays of the report are those of the rule itself, step by step."""
+    (tuned,) = tuned_by(height_candidates()[:1], ways(), way="rough")
+    (judged,) = judged_by([tuned], ways())
+    recording = ways()[1]
+    values, rule = tuned.candidate.values(recording), tuned.rule
+    expected = []
+    for robot in range(recording.robots):
+        k = np.zeros(1)
+        for t in range(len(recording.time)):
+            k = rule.step(k, values[t, robot : robot + 1])
+            if rule.fires(k, np.ones(1))[0]:
+                entry = recording.rough[:, robot].argmax()
+                expected.append(recording.distance[t, robot] - recording.distance[entry, robot])
+                break
+    assert sorted(judged.courses[1].delays_m) == pytest.approx(sorted(expected))
+
+
+def test_numbers_that_are_given_are_judged_as_those_that_are_chosen():
+    tuned = tuned_by(height_candidates()[:1], ways(), way="rough")
+    chosen = tuned[0].choice
+    numbers = {"alpha": chosen.alpha, "beta": chosen.beta, "leak": chosen.leak}
+    given = as_given(height_candidates()[:1], way="rough", **numbers)
+    by_choice, by_hand = (judged_by(those, ways())[0].courses for those in (tuned, given))
+    assert [c.delays_m for c in by_hand] == [c.delays_m for c in by_choice]
+    assert by_hand[1].tally.detected[0, 0] == 3
+    # No two of the feet differ by 20 cm where the noise is of 4 cm.
+    (far,) = judged_by(as_given(height_candidates()[:1], way="rough", alpha=0.2, beta=0.0), ways())
+    assert far.courses[1].tally.came[0, 0] == 3
+    assert far.courses[1].tally.detected[0, 0] == 0
+
+
+def test_the_way_back_notices_that_rough_ground_has_ended():
+    ahead = march("out-of", noise=0.04, seed=2)
+    turned = {
+        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
+    }
+
+    def out():
+        return [replace(ahead, **turned)]
+
+    (tuned,) = tuned_by(height_candidates()[:1], out(), way="flat")
+    assert tuned.rule.when == "below"
+    (judged,) = judged_by([tuned], out())
+    assert judged.courses[0].tally.detected[0, 0] == 3
+    assert judged.courses[0].tally.fired[0, 0] == 0
+
+
+def test_on_the_way_back_an_oracle_notices_the_very_step_in_which_rough_ground_ends():
+    ahead = march("out-of", noise=0.04, seed=2)
+    turned = {
+        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
+    }
+
+    def out():
+        return [replace(ahead, **turned)]
+
+    tuned = tuned_by([c for c in CANDIDATES if c.name == "oracle"], out(), way="flat")
+    (judged,) = judged_by(tuned, out())
+    assert judged.courses[0].tally.fired[0, 0] == 0
+    assert judged.courses[0].delays_m == pytest.approx([0.0] * 3)
+
+
+def test_a_condition_whose_signals_are_missing_is_left_out():
+    slip = [c for c in CANDIDATES if c.name in ("slip", "height_difference")]
+    assert [t.candidate.name for t in tuned_by(slip, ways(), way="rough")] == ["height_difference"]
+
+
+# Passages -----------------------------------------------------------------------------------------
+
+
+def test_passages_are_cut_at_their_length_at_the_border_and_at_a_fall():
+    """4 m smooth and 8 m rough: one whole passage of 3 m, then two; after a fall none."""
+    recording = march("into", noise=0.04, robots=1)
+    values = np.ones((len(recording.time), 1, 1))
+    rule, alphas = Rule(alpha=1.0, beta=50.0), np.array([0.5, 2.0])
+    scores = passage_scores(recording, values, rule, alphas)
+    assert scores == {False: [1], True: [1, 1]}, "of the two α only 0.5 lies below 1"
+    patient = replace(rule, beta=299.5)
+    assert passage_scores(recording, values, patient, alphas) == {False: [1], True: [1, 1]}
+    too_patient = replace(rule, beta=310.0)
+    assert passage_scores(recording, values, too_patient, alphas) == {False: [0], True: [0, 0]}
+    alive = recording.alive.copy()
+    alive[750:] = False
+    fallen = passage_scores(replace(recording, alive=alive), values, rule, alphas)
+    assert fallen == {False: [1], True: [1]}
+
+
+def test_the_interval_of_an_area_is_wide_where_trials_are_few():
+    low, high = auc_interval(1.0, 30, 2000)
+    assert high == pytest.approx(1.0)
+    assert low == pytest.approx(1.0 - 1.96**2 / (30 + 1.96**2), abs=1e-3), "Wilson's, at 30 of 30"
+
+
+# The commands -------------------------------------------------------------------------------------
+
+
+def table(path, recording):
+    """Robot 0 of a recording as a CSV file."""
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file)
+        head = ["time", "rough", "roll", "pitch", *(f"contact_{leg}" for leg in LEGS)]
+        rows.writerow([*head, *(f"foot_{leg}_{axis}" for leg in LEGS for axis in "xyz")])
+        for t in range(len(recording.time)):
+            rows.writerow(
+                [
+                    f"{recording.time[t]:.2f}",
+                    int(recording.rough[t, 0]),
+                    0.0,
+                    0.0,
+                    *recording.contact[t, 0].astype(int),
+                    *recording.foot_position_b[t, 0].ravel(),
+                ]
+            )
+    return path
+
+
+def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
+    logs = [
+        str(table(tmp_path / f"walk{seed}.csv", march("into", noise=0.04, robots=1, seed=seed)))
+        for seed in range(4)
+    ]
+    out = tmp_path / "report"
+    command = ["identify", *logs, "--condition", "all", "--out", str(out), "--json"]
+    main(command)
+    rows = json.loads(capsys.readouterr().out)["conditions"]
+    names = [row["condition"] for row in rows]
+    wanted = {"paper", "height_difference", "touchdown_surprise", "oracle", "classifier"}
+    assert wanted <= set(names)
+    assert "slip" not in names, "the table has no velocity"
+    readme = (out / "README.md").read_text()
+    for name in names:
+        assert f"## {name}" in readme
+        assert (out / f"{name}.png").stat().st_size < 300_000
+    assert "the same logs" in readme.lower()
+    with (out / "courses.csv").open() as file:
+        assert len(list(csv.DictReader(file))) == len(names) * len(logs)
+    with pytest.raises(SystemExit) as end:
+        main(command)
+    assert end.value.code == 2, "a report that is there is not overwritten unasked"
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
+    log = str(table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1)))
+    command = ["identify", log, "--condition", "paper", "--alpha", "0.2", "--beta", "1000"]
+    main([*command, "--out", str(tmp_path / "report"), "--json"])
+    (row,) = json.loads(capsys.readouterr().out)["conditions"]
+    assert (row["alpha"], row["beta"], row["leak"], row["keeps_still"]) == (0.2, 1000.0, 0.0, None)
+    assert (row["came"], row["detected"]) == (1, 0)
+    readme = (tmp_path / "report" / "README.md").read_text()
+    assert "at the numbers that were given" in readme
+    assert "same logs" not in readme
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "record"),
+        (["nowhere.npz"], "no log file nowhere.npz"),
+        (["README.md"], ".npz"),
+        (["{log}", "--condition", "guess"], "no condition 'guess'"),
+        (["{log}", "--condition", "slip"], "lack the signals"),
+        (["{smooth}"], "no rough ground"),
+        (["{log}", "--alpha", "0.2"], "--beta"),
+        (["{log}", "--leak", "1"], "--alpha and --beta"),
+        (["{log}", "--alpha", "-1", "--beta", "3"], "alpha must be positive"),
+        (["{log}", "--alpha", "1", "--beta", "3", "--condition", "all"], "another unit"),
+    ],
+)
+def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
+    logs = {
+        "log": table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1)),
+        "smooth": table(tmp_path / "flat.csv", march("flat", noise=0.0, robots=1)),
+    }
+    given = [argument.format(**logs) for argument in arguments]
+    with pytest.raises(SystemExit) as end:
+        main(["identify", *given, "--out", str(tmp_path / "report")])
+    assert end.value.code == 2
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert message in error
+    made = [path for path in (tmp_path / "report").rglob("*") if "unfinished" not in path.parts]
+    assert not made, "but what was found out of single logs"
+
+
+# Going on -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def two_logs(tmp_path):
+    walks = [march("into", noise=0.04, robots=1), march("into", noise=0.04, robots=1, seed=5)]
+    return [table(tmp_path / f"walk-{i}.csv", walk) for i, walk in enumerate(walks)]
+
+
+def replayed_logs(monkeypatch, killed_at=None):
+    """Files that are replayed from here on, in turn; the process is killed at one of them."""
+    seen = []
+
+    def reading(paths, way):
+        for path in paths:
+            if len(seen) == killed_at:
+                raise KeyboardInterrupt
+            seen.append(path.stem)
+        return sources.recordings(paths, way)
+
+    monkeypatch.setattr("gaitshift.lab.identification.task.recordings", reading)
+    return seen
+
+
+def identify(logs, out, *more):
+    main(["identify", *map(str, logs), "--out", str(out), "--condition", "paper", "oracle", *more])
+
+
+def report_in(folder):
+    return {name: (folder / name).read_text() for name in ("conditions.csv", "courses.csv")}
+
+
+@pytest.mark.parametrize("killed_at", [1, 2, 3])
+def test_a_run_that_was_killed_goes_on_where_it_stopped(
+    tmp_path, monkeypatch, capsys, two_logs, killed_at
+):
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    identify(two_logs, whole)
+    done = replayed_logs(monkeypatch, killed_at)
+    with pytest.raises(SystemExit) as end:
+        identify(two_logs, out)
+    assert end.value.code == 130
+    after = replayed_logs(monkeypatch)
+    capsys.readouterr()
+    identify(two_logs, out)
+    assert [*done, *after] == ["walk-0", "walk-1", "walk-0", "walk-1"], "chosen by, then judged by"
+    assert "choosing: walk-0 (kept)" in capsys.readouterr().err
+    assert report_in(out) == report_in(whole)
+    assert not (out / "unfinished").exists()
+
+
+def test_what_was_kept_of_a_log_is_not_used_for_another_one_of_its_name(
+    tmp_path, monkeypatch, two_logs
+):
+    out = tmp_path / "out"
+    replayed_logs(monkeypatch, killed_at=2)
+    with pytest.raises(SystemExit):
+        identify(two_logs, out)
+    table(two_logs[1], march("into", noise=0.05, robots=1, seed=6))
+    after = replayed_logs(monkeypatch)
+    identify(two_logs, out)
+    assert after == ["walk-1", "walk-0", "walk-1"]
+    whole = tmp_path / "whole"
+    identify(two_logs, whole)
+    assert report_in(out) == report_in(whole)
+
+
+def test_numbers_that_were_kept_are_not_used_for_others(tmp_path, monkeypatch, two_logs):
+    out = tmp_path / "out"
+    replayed_logs(monkeypatch, killed_at=1)
+    with pytest.raises(SystemExit):
+        main(["identify", *map(str, two_logs), "--out", str(out), "--alpha", "0.1", "--beta", "9"])
+    after = replayed_logs(monkeypatch)
+    main(["identify", *map(str, two_logs), "--out", str(out), "--alpha", "0.01", "--beta", "9"])
+    assert after == ["walk-0", "walk-1"]
+
+
+def test_the_classifier_goes_on_too(tmp_path, monkeypatch, two_logs):
+    out, whole = tmp_path / "out", tmp_path / "whole"
+    for folder, killed_at in ((whole, None), (out, 5), (out, None)):
+        seen = replayed_logs(monkeypatch, killed_at)
+        if killed_at is None:
+            identify(two_logs, folder, "classifier")
+        else:
+            with pytest.raises(SystemExit):
+                identify(two_logs, folder, "classifier")
+    assert seen == ["walk-1"], "the last log to be judged by"
+    assert report_in(out) == report_in(whole)
+
+
+def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys):
+    logs = tmp_path / "logs"
+    command = ["record", "trot", "--out", str(logs), "--courses", "flat", "into-0.20"]
+    command += ["--robots", "8", "--seconds", "9", "--json"]
+    main(command)
+    rows = json.loads(capsys.readouterr().out)["logs"]
+    assert [row["robots"] for row in rows] == [8, 8]
+    before = [path.stat().st_mtime_ns for path in sorted(logs.iterdir())]
+    main(command)
+    assert "kept" in capsys.readouterr().err
+    assert [path.stat().st_mtime_ns for path in sorted(logs.iterdir())] == before
+    files = [str(path) for path in sorted(logs.iterdir())]
+    main(["identify", *files, "--out", str(tmp_path / "report"), "--json"])
+    (row,) = json.loads(capsys.readouterr().out)["conditions"]
+    assert row["condition"] == "touchdown_surprise"
+    assert row["false_shifts"] == 0
+    assert row["detected"] >= 7
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [([], "trot"), (["trot", "--courses", "moon"], "no course 'moon'"), (["moon"], "no policy")],
+)
+def test_bad_input_of_record_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
+    with pytest.raises(SystemExit) as end:
+        main(["record", *arguments, "--out", str(tmp_path / "logs")])
+    assert end.value.code == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+
+
+# The classifier -----------------------------------------------------------------------------------
+
+
+def test_a_classifier_is_judged_on_robots_that_it_never_saw():
+    """Labels of pure chance: what it has learned by heart helps it on its own robots alone."""
+    rng = np.random.default_rng(4)
+    noise = march("noise", noise=0.0, robots=2)
+    chance = replace(noise, rough=rng.random((len(noise.time) // 50, 2)).repeat(50, axis=0) < 0.5)
+    classifier = RoughnessClassifier.fit([chance])
+    truth = chance.rough.ravel()
+    areas = []
+    for crosswise in (False, True):
+        likely = classifier.probability(chance, crosswise=crosswise).ravel()
+        areas.append(auc(likely[truth][:, None], likely[~truth][:, None])[0])
+    assert areas[0] > 0.9
+    assert areas[1] < 0.7
+
+
+def test_a_classifier_learns_what_rough_ground_is():
+    classifier = RoughnessClassifier.fit(ways())
+    other = march("into", noise=0.04, seed=9)
+    likely = classifier.probability(other, crosswise=False)[..., 0]
+    assert likely[150:380].mean() < 0.1
+    assert likely[600:].mean() > 0.9
+
+
+@pytest.mark.parametrize(("rough", "says"), [(True, "rough"), (False, "smooth")])
+def test_a_classifier_needs_both_labels(rough, says):
+    one_kind = march("flat", noise=0.0)
+    with pytest.raises(GaitshiftError, match=f"all labels are {says}"):
+        RoughnessClassifier.fit([replace(one_kind, rough=np.full_like(one_kind.rough, rough))])
+
+
+def test_of_all_conditions_the_classifier_is_left_out_where_one_robot_is_all_there_is(
+    tmp_path, capsys
+):
+    log = table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1))
+    out = ["--out", str(tmp_path / "report"), "--json"]
+    main(["identify", str(log), "--condition", "all", *out])
+    said = capsys.readouterr()
+    assert "left out" in said.err
+    assert "classifier" not in {row["condition"] for row in json.loads(said.out)["conditions"]}
+    with pytest.raises(SystemExit) as end:
+        main(["identify", str(log), "--condition", "classifier", "--overwrite", *out])
+    assert end.value.code == 2

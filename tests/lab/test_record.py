@@ -1,0 +1,73 @@
+"""`gaitshift record` keeps a log that is what was asked for, and refuses one that is not."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gaitshift.control.policies
+from gaitshift.cli import main
+from gaitshift.lab.log import Log
+
+TROT = Path(gaitshift.control.policies.__path__[0]) / "trot.onnx"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A folder with a log of two robots for 0.3 s."""
+    folder = tmp_path_factory.mktemp("record") / "logs"
+    main(ask(folder, 2, 0.3))
+    return folder
+
+
+def ask(folder, robots, seconds, *more, courses=("flat",)):
+    numbers = ["--robots", str(robots), "--seconds", str(seconds)]
+    return ["record", "trot", *more, "--out", str(folder), "--courses", *courses, *numbers]
+
+
+def refused(capsys, command):
+    with pytest.raises(SystemExit) as end:
+        main(command)
+    assert end.value.code == 2
+    return capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(("robots", "seconds"), [(3, 0.3), (2, 0.4), (2, 0.2)])
+def test_a_kept_log_of_other_size_is_refused_before_anything_is_recorded(
+    recorded, tmp_path, capsys, robots, seconds
+):
+    logs = shutil.copytree(recorded, tmp_path / "logs")
+    line = refused(capsys, ask(logs, robots, seconds, courses=("up-10", "flat")))
+    assert f"{logs / 'trot-flat-0.npz'} is there already and holds 2 robots × 0.3 s" in line
+    assert f"not {robots} × {seconds:g} s" in line
+    assert "--overwrite" in line
+    assert [path.name for path in logs.iterdir()] == ["trot-flat-0.npz"]
+    main([*ask(logs, robots, seconds), "--overwrite"])
+    assert Log.load(logs / "trot-flat-0.npz").fallen.shape == (round(100 * seconds), robots)
+
+
+def test_a_log_that_ended_as_all_robots_had_fallen_is_kept(recorded, tmp_path, capsys):
+    path = shutil.copytree(recorded, tmp_path / "logs") / "trot-flat-0.npz"
+    log = Log.load(path)
+    fallen = np.zeros_like(log.fallen)
+    fallen[-1] = True
+    replace(log, fallen=fallen).save(path)
+    before = path.read_bytes()
+    main(ask(path.parent, 2, 8))
+    assert "kept" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+def test_two_policies_of_one_gait_are_refused(tmp_path, capsys):
+    mine = shutil.copy(TROT, tmp_path / "mine.onnx")
+    line = refused(capsys, ask(tmp_path / "logs", 2, 0.3, str(mine)))
+    assert "two of the policies are of the gait 'trot'" in line
+    assert "--out" in line
+    assert not (tmp_path / "logs").exists()
+
+
+def test_a_length_that_is_none_is_refused_before_anything_is_recorded(tmp_path, capsys):
+    assert "more than 0, up to 3600" in refused(capsys, ask(tmp_path / "logs", 2, "nan"))
+    assert not (tmp_path / "logs").exists()

@@ -1,0 +1,66 @@
+"""The loops about a command, on robots in closed form."""
+
+import numpy as np
+import pytest
+
+from gaitshift.robot.command import CONTROL_PERIOD, HeadingLoop, SpeedLoop
+
+WANTED = 1.2
+
+
+def run(robot, seconds, loop=None):
+    """Asks a robot (speed of what is asked and when) by the loop; what was asked at the end."""
+    loop = SpeedLoop() if loop is None else loop
+    wanted = np.full(1, WANTED)
+    state, asked = loop.start(1), wanted
+    for step in range(round(seconds / CONTROL_PERIOD)):
+        speed = np.array([robot(asked[0], step * CONTROL_PERIOD)])
+        state, asked = loop.step(state, wanted, speed)
+    return asked[0]
+
+
+@pytest.mark.parametrize(("share", "off"), [(1.0, 0.1), (1.08, 0.0), (0.95, -0.03), (1.1, -0.05)])
+def test_a_robot_that_is_off_by_a_little_is_asked_for_what_brings_the_wanted_speed(share, off):
+    """Share · asked + off = wanted has one solution."""
+    asked = run(lambda asked, time: share * asked + off, 10.0)
+    assert share * asked + off == pytest.approx(WANTED, abs=0.002)
+
+
+def test_the_swing_of_the_speed_within_a_stride_hardly_shows():
+    steady = run(lambda asked, time: asked + 0.05 + 0.3 * np.sin(2 * np.pi * 2.9 * time), 10.0)
+    assert steady == pytest.approx(WANTED - 0.05, abs=0.015)
+
+
+def test_a_robot_that_is_held_up_is_not_asked_to_run():
+    """Slowed down to a half for 5 s, it is asked for what it was asked before, and a little more.
+
+    While the mean falls by 0.25 m/s, in under half a second, the trim grows by under 0.15.
+    """
+    held = run(lambda asked, time: asked if time < 5.0 else 0.5 * WANTED, 10.0)
+    assert WANTED <= held <= WANTED + 0.15
+    longer = run(lambda asked, time: asked if time < 5.0 else 0.5 * WANTED, 60.0)
+    assert longer == held
+
+
+def test_the_trim_is_bounded():
+    stubborn = run(lambda asked, time: WANTED - 0.2, 30.0)
+    assert stubborn == pytest.approx(WANTED + SpeedLoop().limit)
+
+
+def test_robots_do_not_know_of_each_other():
+    loop, rng = SpeedLoop(), np.random.default_rng(0)
+    wanted = rng.uniform(0.4, 1.6, 5)
+    state, alone = loop.start(5), loop.start(1)
+    for _ in range(200):
+        speed = rng.uniform(0.0, 2.0, 5)
+        state, asked = loop.step(state, wanted, speed)
+        alone, one = loop.step(alone, wanted[3:4], speed[3:4])
+        assert asked[3] == one[0]
+
+
+def test_a_robot_left_of_its_line_turns_right_and_not_too_fast():
+    loop = HeadingLoop()
+    zero = np.zeros(3)
+    rate = loop.yaw_rate(zero, zero, np.array([0.1, -0.1, 100.0]))
+    assert rate[0] < 0 < rate[1]
+    assert rate[2] == -loop.yaw_rate_limit
