@@ -108,7 +108,8 @@ def compare_array(what: str, old: np.ndarray, new: np.ndarray) -> Row:
     if not unequal.any():
         return Row(what, compared, not notes, None if notes else 0.0, "; ".join(notes))
     first = tuple(int(i) for i in np.argwhere(unequal)[0])
-    notes.append(f"first at {list(first)}: {old[first]}, now {new[first]}")
+    place = f"first at {list(first)}: " if first else ""
+    notes.append(f"{place}{old[first]}, now {new[first]}")
     largest = None
     with suppress(ValueError):  # text that is no number
         largest = float(np.abs(old[unequal].astype(float) - new[unequal].astype(float)).max())
