@@ -22,6 +22,7 @@ from gaitshift.video.film import FilmWriter, read_film
 from gaitshift.video.paint import Paint
 from gaitshift.video.stage import SUN, build_stage
 from gaitshift.video.strip import Reading, Strip
+from waiting import PATIENCE
 
 AT_ZERO = np.zeros((2, 2))
 """The course of a robot that stands at x = y = 0."""
@@ -329,7 +330,7 @@ else:
         [sys.executable, "-c", program],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=True,
         env=environment,
     )
