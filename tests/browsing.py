@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from waiting import PATIENCE, wait_until
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 SCREENS = Path(__file__).parent.parent / "out" / "screens"
@@ -22,7 +24,7 @@ def opened(browser, address, **context):
     wrong = []
     page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.set_default_timeout(200_000)
+    page.set_default_timeout(1000 * PATIENCE)
     page.goto(address, wait_until="commit")
     return page, wrong
 
@@ -43,6 +45,21 @@ def shows_a_robot(points):
     high, wide, _ = points.shape
     middle = points[high // 6 : -high // 6, wide // 6 : -wide // 6].max(axis=2)
     return 0.003 < np.mean(middle < 80) < 0.4 and np.mean(middle > 120) > 0.3
+
+
+def wait_for_robot(page, name, columns=1.0, rows=1.0):
+    """Until the page shows a robot in this share of its columns and rows, from the top left.
+
+    A page that opens fades in, so that single screenshots may show it under a veil. The last
+    screenshot is kept as out/screens/NAME.png.
+    """
+
+    def shown():
+        points = keep(page, name)
+        high, wide, _ = points.shape
+        return shows_a_robot(points[: round(high * rows), : round(wide * columns)])
+
+    wait_until(shown)
 
 
 def launched(play):

@@ -8,6 +8,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from waiting import PATIENCE
+
 ON_A_ROBOT = (
     "errors",
     "data",
@@ -54,7 +56,7 @@ sys.meta_path[sys.meta_path.index(PathFinder)] = Lacking
         [sys.executable, "-W", "error", "-c", block + program],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
 

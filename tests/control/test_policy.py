@@ -21,6 +21,7 @@ from gaitshift.learn.learner import Learner, as_tensors
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
+from waiting import PATIENCE
 
 TRAINING = {"command": "gaitshift train trot --seed 3", "seed": 3, "survival": 0.75, "π": [1, 2]}
 
@@ -244,7 +245,7 @@ print(json.dumps(policy.load({str(path)!r})(observation)[0].tolist()))
         [sys.executable, "-W", "error", "-c", program],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=False,
     )
     assert done.returncode == 0, done.stderr

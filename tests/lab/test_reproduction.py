@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -36,6 +35,7 @@ from gaitshift.learn.run import Run
 from gaitshift.show.plots.learning import Landmarks, comparison_curves, reward_curves
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
+from waiting import PATIENCE, wait_until
 
 CHANGES = {
     "multiply-clipped": {"recipe/env/reward/bonus_mode": "multiply_clipped"},
@@ -503,18 +503,13 @@ def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
         text=True,
         start_new_session=True,
     )
-    deadline = time.monotonic() + 300
-    while not list(runs.glob("*/policy.onnx")):
-        assert process.poll() is None, process.stderr.read()
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: any(runs.glob("*/policy.onnx")) or process.poll() is not None, pause=0.02)
+    assert process.poll() is None, process.stderr.read()
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the command
-    said = process.communicate(timeout=60)[1]
+    said = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode == 130
     assert said.strip() == "gaitshift: interrupted"
-    while living(process.pid):
-        assert time.monotonic() < deadline
-        time.sleep(0.1)
+    wait_until(lambda: not living(process.pid))
     assert not out.exists()
     first = {path: path.stat().st_mtime_ns for path in runs.glob("*/policy.onnx")}
     assert 1 <= len(first) < len(Plan.tiny().jobs)

@@ -203,8 +203,7 @@ def test_the_page_opens_without_a_network_and_its_slider_moves_the_robot(log, pa
     opened.locator("#charts canvas").click(position={"x": 500, "y": 60})
     assert opened.evaluate("gaitshift.state.time") != pytest.approx(shift - 1.0, abs=0.02)
     opened.locator("#scene").scroll_into_view_if_needed()
-    picture = browsing.keep(opened, "report")
-    assert browsing.shows_a_robot(picture[: picture.shape[0] * 3 // 4])
+    browsing.wait_for_robot(opened, "report", rows=3 / 4)
     opened.locator("#theme").click()
     assert opened.evaluate("getComputedStyle(document.documentElement).colorScheme") == "dark"
     assert not wrong

@@ -22,6 +22,7 @@ from gaitshift.show.video.paint import Paint
 from gaitshift.show.video.stage import SUN, build_stage
 from gaitshift.show.video.strip import Reading, Strip
 from gaitshift.sim.terrain import flat, from_spec
+from waiting import PATIENCE
 
 AT_ZERO = np.zeros((2, 2))
 """The course of a robot that stands at x = y = 0."""
@@ -329,7 +330,7 @@ else:
         [sys.executable, "-c", program],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=PATIENCE,
         check=True,
         env=environment,
     )
