@@ -1,5 +1,5 @@
 # The verbs are CI's. Each makes .venv on first use and installs what it needs; after that a call
-# costs nothing until pyproject.toml or constraints.txt changes. Another Python: make PYTHON=...
+# costs nothing until pyproject.toml or requirements.lock changes. Another Python: make PYTHON=...
 
 PYTHON ?= python3
 VENV := .venv
@@ -17,7 +17,7 @@ STUBS := typings/.made
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test check bench policies docs player clean
+.PHONY: help demo test check bench policies docs lock player clean
 
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -46,6 +46,10 @@ policies: $(DEV) ## train the shipped gaits anew, one after another, and put the
 docs: $(DEV) ## the documentation as a site: out/site/index.html
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo out/site/index.html
 
+lock: $(DEV) ## renew requirements.lock: the newest versions that pyproject.toml allows
+	@$(BIN)/uv pip compile pyproject.toml --universal --python-version 3.11 --all-extras --upgrade \
+	    --no-annotate --custom-compile-command 'make lock' --quiet --output-file requirements.lock
+
 player: ## bundle the player of reports with three.js (needs npm); its result is committed
 	@cd web && npm ci --silent --no-audit --no-fund && npm run --silent build
 
@@ -58,15 +62,15 @@ $(BIN)/python:
 	    { echo 'gaitshift needs Python 3.11 or newer: make PYTHON=python3.12, for example' >&2; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-$(BASE): pyproject.toml | $(BIN)/python
+$(BASE): pyproject.toml requirements.lock | $(BIN)/python
 	@echo 'installing gaitshift into $(VENV) (once)'
-	@$(PIP) install --editable .
+	@$(PIP) install --constraint requirements.lock --editable .
 	@touch $@
 
-$(DEV): pyproject.toml constraints.txt | $(BIN)/python
+$(DEV): pyproject.toml requirements.lock | $(BIN)/python
 	@echo 'installing gaitshift with training and tools into $(VENV) (once, some minutes)'
-	@$(PIP) install --constraint constraints.txt torch
-	@$(PIP) install --constraint constraints.txt --editable '.[train,identify,view,meshes,dev]'
+	@$(PIP) install --requirement requirements.lock
+	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@touch $(BASE) $@
 
 $(STUBS): $(DEV)

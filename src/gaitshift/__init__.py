@@ -1,3 +1,3 @@
 """Quadruped gaits as reward machines, and the conditions by which a robot shifts them itself."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -1,5 +1,7 @@
 """The product S × U: Gymnasium's contract, one step told twice, and what ends an episode."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import gymnasium as gym
@@ -133,6 +135,20 @@ def test_make_vec_knows_every_shipped_gait(gait):
     assert env.machine.name == gait
     assert env.num_envs == 3
     assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+@pytest.mark.parametrize("make", ["make", "make_vec"])
+def test_an_id_with_our_module_needs_no_import_of_ours(make):
+    program = f"""
+import gymnasium
+env = gymnasium.{make}("gaitshift.sim.env:gaitshift/trot-v0")
+env.reset(seed=0)
+env.step(env.action_space.sample())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_registered_environments_take_terrain_and_config():
