@@ -10,9 +10,9 @@ import sys
 import time
 
 import numpy as np
+from gaitshift.robot.motion import Motion
 
 from gaitshift.control import Autonomous, Driver, policy
-from gaitshift.robot.motion import Motion
 from gaitshift.shift import GaitGraph
 
 RNG = np.random.default_rng(0)

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from gaitshift.robot.motion import Motion
 
 from gaitshift.control.observation import (
     DEFAULT_SLICES,
@@ -18,7 +19,6 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.robot.command import Command
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.robot.motion import Motion
 from gaitshift.shift import HeightDifference, Signals
 from gaitshift.sim.terrain import flat
 from gaitshift.sim.world import World

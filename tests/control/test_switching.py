@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from gaitshift.robot.motion import Motion
 
 from gaitshift.control import Autonomous, Driver, Scheduled, Switcher, policy
 from gaitshift.control.observation import Situation
@@ -15,7 +16,6 @@ from gaitshift.learn.learner import Learner
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.robot.command import Command
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.robot.motion import Motion
 from gaitshift.shift import Condition, Edge, GaitGraph, Rule, Signals
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat

@@ -4,12 +4,12 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from gaitshift.robot.motion import Motion
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import Command
-from gaitshift.robot.motion import Motion
 from gaitshift.sim.reward import (
     ADDITIONS,
     BONUS_MODES,

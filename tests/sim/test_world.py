@@ -6,12 +6,12 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 import pytest
+from gaitshift.robot.motion import Motion
 from scipy.spatial.transform import Rotation
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.legs import LEGS
-from gaitshift.robot.motion import Motion
 from gaitshift.sim.terrain import flat, perlin, slope, step
 from gaitshift.sim.world import PushConfig, Pusher, World
 from gaitshift.sim.world.scene import build_model

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 import tyro
 
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
-from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.log import Log
@@ -67,12 +66,11 @@ class Demo(DemoConfig):
 
     def run(self) -> None:
         """Runs, draws, and says where to look."""
-        learned = self.controller == "policy"
-        policies = {gait: policy.load(gait) for gait in self.used} if learned else {}
+        _ = self.used  # what cannot be had is refused before any work
         files = (PAGE, VIDEO, PICTURE, LOG, SUMMARY)
         check_folder(self.out, overwrite=self.overwrite, ours=files)
         with progress("walking") as report:
-            log, summaries = run_demo(self, policies, report)
+            log, summaries = run_demo(self, report)
         summary = self._summary(summaries)
         self.out.mkdir(parents=True, exist_ok=True)
         log.save(self.out / LOG)

@@ -10,9 +10,9 @@ import tyro
 
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
 from gaitshift.control import policy as policies
-from gaitshift.control.cpg import CpgController
+from gaitshift.control.controllers import controller_maker
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait import RewardMachine, gaits
+from gaitshift.gait import RewardMachine
 from gaitshift.lab.evaluation import (
     SIZES,
     EvaluationConfig,
@@ -54,9 +54,9 @@ class Evaluate(EvaluationConfig):
 
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
-    controller: Literal["policy", "cpg"] = "policy"
-    """What walks: the policy, or, in the gait of this name, coupled oscillators that learned
-    nothing: a baseline (trot, pace, bound, walk)."""
+    controller: str = "policy"
+    """What walks, by name: `policy`; or, in the gait of this name, `cpg`, coupled oscillators that
+    learned nothing: a baseline (trot, pace, bound, walk)."""
     robot_file: Path | None = None
     """The robot of the policy, if it is not ANYmal B, as it was given to `train`."""
     trials: Literal["all", "short", "quick"] | None = None
@@ -77,12 +77,12 @@ class Evaluate(EvaluationConfig):
     def run(self) -> None:
         """Evaluates, prints and draws."""
         self._check_files()
-        if self.controller == "cpg":
-            walker = CpgController([self.policy], self.episodes, start=self.policy)
+        if self.controller != "policy":
+            walker = controller_maker(self.controller)([self.policy], self.episodes)
             self._make_folder()
-            told = {"controller": "cpg", "gait": self.policy}
+            told = {"controller": self.controller, "gait": walker.repertoire.gaits[0]}
             figures, log = self._evaluate(partial(evaluate_controller, walker), told)
-            self._write(figures, log, gaits.load(self.policy))
+            self._write(figures, log, walker.repertoire.machines[0])
             return
         use_robot_file(self.robot_file)
         loaded = policies.load(self.policy)
@@ -171,13 +171,15 @@ class Evaluate(EvaluationConfig):
             from gaitshift.show.plots.style import check_target
 
             check_target(self.plot)
-        if self.controller == "cpg" and self.robot_file is not None:
-            raise GaitshiftError("the oscillators know ANYmal B alone: no --robot-file")
+        if self.controller != "policy" and self.robot_file is not None:
+            raise GaitshiftError(
+                f"--robot-file is for policies, got --controller {self.controller}"
+            )
         if self.trials is None and not self.commands:
             return
         mode = "--commands" if self.commands else "--trials"
         if self.controller != "policy":
-            raise GaitshiftError(f"{mode} is for policies: no --controller {self.controller}")
+            raise GaitshiftError(f"{mode} is for policies, got --controller {self.controller}")
         if self.commands and (self.trials or self.log or self.plot):
             raise GaitshiftError("--commands stands alone: no --trials, --log or --plot")
         for field in fields(EvaluationConfig):

@@ -10,7 +10,7 @@ import tyro
 
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.control import policy as policies
-from gaitshift.control.policy import Policy
+from gaitshift.control.controllers import controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select
@@ -26,7 +26,10 @@ class Record:
     """
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Shipped policies by the names of their gaits, or policy files ending in .onnx."""
+    """Shipped policies by the names of their gaits, or policy files ending in .onnx; with another
+    controller, names of its gaits."""
+    controller: str = "policy"
+    """What walks, by name: `policy`; `cpg`, coupled oscillators that learned nothing."""
     out: Path
     """Folder of the logs."""
     courses: tuple[str, ...] = ()
@@ -47,32 +50,31 @@ class Record:
         if not self.policies:
             raise GaitshiftError(f"which gaits? give some of {', '.join(policies.shipped())}")
         _ = EvaluationConfig(episodes=self.robots, seconds=self.seconds, seed=self.seed)
-        loaded = [policies.load(name) for name in self.policies]
+        make = controller_maker(self.controller)
+        gaits = [make([name], 1).repertoire.gaits[0] for name in self.policies]
         chosen = select(self.courses)
         if self.out.exists() and not self.out.is_dir():
             raise GaitshiftError(f"{self.out} is a file; give a folder with --out")
-        gaits = [policy.gait for policy in loaded]
         twice = [gait for gait in gaits if gaits.count(gait) > 1]
         if twice:
             raise GaitshiftError(
                 f"two of the policies are of the gait '{twice[0]}', and would write the same logs; "
                 "record them one by one, each with an --out of its own"
             )
-        kept = self._kept([(policy, course) for policy in loaded for course in chosen])
+        kept = self._kept([(gait, course) for gait in gaits for course in chosen])
         self.out.mkdir(parents=True, exist_ok=True)
         rows: list[dict[str, Any]] = []
-        for policy in loaded:
+        for name, gait in zip(self.policies, gaits, strict=True):
             for course in chosen:
-                path = self._path(policy, course)
+                path = self._path(gait, course)
                 if path in kept:
                     say(f"{path} is there already, and kept")
                     rows.append(kept[path])
                     continue
-                with progress(f"{policy.gait}, {course.name}") as report:
+                with progress(f"{gait}, {course.name}") as report:
                     log = run_course(
-                        policy,
+                        make([name], self.robots),
                         course,
-                        robots=self.robots,
                         seconds=self.seconds,
                         seed=self.seed,
                         report=report,
@@ -88,10 +90,10 @@ class Record:
             ]
             emit_table(f"logs in {self.out}", table)
 
-    def _path(self, policy: Policy, course: Course) -> Path:
-        return self.out / f"{policy.gait}-{course.name}-{self.seed}.npz"
+    def _path(self, gait: str, course: Course) -> Path:
+        return self.out / f"{gait}-{course.name}-{self.seed}.npz"
 
-    def _kept(self, asked: Sequence[tuple[Policy, Course]]) -> dict[Path, dict[str, Any]]:
+    def _kept(self, asked: Sequence[tuple[str, Course]]) -> dict[Path, dict[str, Any]]:
         """What is told of the logs that are there already, each as long and of as many as asked.
 
         Raises:
@@ -99,8 +101,8 @@ class Record:
         """
         kept: dict[Path, dict[str, Any]] = {}
         steps = RolloutConfig(seconds=self.seconds).steps
-        for policy, course in asked:
-            path = self._path(policy, course)
+        for gait, course in asked:
+            path = self._path(gait, course)
             if self.overwrite or not path.exists():
                 continue
             log = Log.load(path)
@@ -117,11 +119,11 @@ class Record:
 
 def _row(path: Path, log: Log) -> dict[str, Any]:
     last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
-    x = np.take_along_axis(log.qpos[..., 0].astype(float), last[None], axis=0)[0]
+    x = np.take_along_axis(log.truth.base_position_w[..., 0].astype(float), last[None], axis=0)[0]
     return {
         "log": str(path),
         "terrain": log.terrain,
         "robots": log.fallen.shape[1],
         "fallen": int(log.fallen[-1].sum()),
-        "km": float((x - log.qpos[0, :, 0]).sum() / 1000.0),
+        "km": float((x - log.truth.base_position_w[0, :, 0]).sum() / 1000.0),
     }

@@ -13,7 +13,7 @@ from gaitshift.lab.evaluation import DemoConfig
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.robot_file import use_robot_file
-from gaitshift.shift import load_condition
+from gaitshift.shift.graph_file import DEFAULT
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 
@@ -33,8 +33,8 @@ class View:
     """The ground, piece by piece with lengths in metres."""
     robots: int = 1
     """Robots on the track, 1 to 16; charts tell of the first."""
-    condition: str = DemoConfig.condition
-    """When to shift from trot to bound and back, by name."""
+    condition: str = DEFAULT
+    """When to shift from trot to bound and back, by the name of a shipped graph."""
     seed: int = 0
     """Seed of the ground and of the starts."""
     host: str = "127.0.0.1"
@@ -65,7 +65,7 @@ class View:
         config = LiveConfig(
             track=self.track,
             robots=self.robots,
-            condition=load_condition(self.condition),
+            condition=self.condition,
             seed=self.seed,
         )
         use_robot_file(self.robot_file)

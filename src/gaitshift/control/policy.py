@@ -7,10 +7,11 @@ from typing import Any, cast
 
 import numpy as np
 import onnxruntime
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 
 from gaitshift.control.observation import Observation
 from gaitshift.control.policy_info import PolicyInfo, read_info
+from gaitshift.control.walker import Walker
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD
@@ -44,7 +45,16 @@ class Policy:
     @cached_property
     def observation(self) -> Observation:
         """The observation it wants."""
-        return Observation(self.machine, tuple(self.info.observation))
+        return Observation(self.machine, tuple(self.info.stance), tuple(self.info.observation))
+
+    @cached_property
+    def walker(self) -> Walker:
+        """Its gait at work."""
+        return Walker(
+            machine=self.machine,
+            observation=self.observation,
+            action_scale=self.info.action_scale,
+        )
 
     def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
         """The deterministic actions for N observations."""
@@ -68,10 +78,6 @@ class Policy:
     def _run(self, output: str, observation: np.ndarray) -> np.ndarray:
         options = _ONLY_WHAT_IS_ASKED
         return cast(Any, self.session).run([output], {"observation": observation}, options)[0]
-
-    def target(self, action: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "N 12"]:
-        """Joint targets [rad] of an action."""
-        return np.asarray(self.info.stance) + self.info.action_scale * action
 
 
 def shipped() -> tuple[str, ...]:

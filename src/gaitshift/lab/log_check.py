@@ -8,12 +8,11 @@ import numpy as np
 
 from gaitshift.errors import GaitshiftError
 
-TIMELESS = ("gaits", "robot", "terrain")
-"""What the names of fields begin with whose first axis is not time."""
+_MAY_BE_NAN = ("sensed.value", "k", "threshold")
+"""Arrays of which anything may be expected where a robot lies; all others hold finite numbers."""
 
-_FINITE = ("time", "qpos", "qvel", "torque", "foot_position_w", "command")
-"""Arrays that hold numbers at all times, and so does the ground; heights of feet that never
-touched, and what conditions make of a robot that lies, may be anything."""
+_FIRST = "sensed.contact"
+"""The array whose shape says how many steps and robots there are."""
 
 LEAST_PERIOD, MOST_PERIOD = 0.0005, 0.5
 """Between two entries [s]; ours: no robot is controlled faster, and no step is seen slower, so what
@@ -40,7 +39,7 @@ def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) 
     """
     whole = {**values, **_shaped(path, values, declared)}
     _check_numbers(path, whole)
-    _check_time(path, whole["time"])
+    _check_time(path, whole["sensed.time"])
     return whole
 
 
@@ -50,7 +49,7 @@ def _shaped(
     """The arrays in the shapes and of the kinds that are declared."""
     declared = {name: _declared(of) for name, of in types.items()}
     sizes, shaped = dict[str, int](), dict[str, np.ndarray]()
-    for name in sorted((n for n, of in declared.items() if of is not None), key="qpos".__ne__):
+    for name in sorted((n for n, of in declared.items() if of is not None), key=_FIRST.__ne__):
         array: np.ndarray = values[name]
         wanted, kind = declared[name] or ((), "")
         known = [int(dim) if dim.isdigit() else sizes.get(dim) for dim in wanted]
@@ -83,24 +82,28 @@ def _declared(annotation: Any) -> tuple[tuple[str, ...], str] | None:
     if not hasattr(of, "dim_str"):
         return None
     kinds = {np.dtype(name).kind for name in ("bool", "int64", "float64") if name in of.dtypes}
-    return tuple(of.dim_str.split()), kinds.pop()
+    axes = of.dim_str.replace("*batch", "T N").replace("steps", "T")
+    return tuple(axes.split()), kinds.pop()
 
 
 def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
     """Refuses what no robot can have done."""
-    for name in (*_FINITE, *(n for n in values if n.startswith("terrain_"))):
-        finite = np.isfinite(values[name])
+    for name, value in values.items():
+        if name in _MAY_BE_NAN or not isinstance(value, np.ndarray) or value.dtype.kind != "f":
+            continue
+        finite = np.isfinite(np.asarray(value, dtype=float))
         if not finite.all():
             raise GaitshiftError(
                 f"{path}: '{name}' is not finite{_where(~finite, name)}; numbers would be right"
             )
-    length = np.linalg.norm(values["qpos"][..., 3:7], axis=-1)
-    wrong = np.abs(length - 1.0) > 0.01
-    if wrong.any():
-        raise GaitshiftError(
-            f"{path}: 'qpos' has a quaternion of length {length[wrong][0]:.3g}"
-            f"{_where(wrong, 'qpos')}; 1 would be right"
-        )
+    for name in ("sensed.orientation", "truth.base_quaternion_w"):
+        length = np.linalg.norm(values[name], axis=-1)
+        wrong = np.abs(length - 1.0) > 0.01
+        if wrong.any():
+            raise GaitshiftError(
+                f"{path}: quaternions of '{name}' must have length 1, got {length[wrong][0]:.3g}"
+                f"{_where(wrong, name)}"
+            )
     gait, names = values["gait"], values["gaits"]
     if gait.min() < 0 or gait.max() >= len(names):
         raise GaitshiftError(
@@ -111,7 +114,7 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
 
 def _where(wrong: np.ndarray, name: str) -> str:
     """The first place where an array is wrong, in words."""
-    if name.startswith(TIMELESS):
+    if name.startswith("terrain_"):
         return ""
     step, *robot = np.argwhere(wrong)[0][:2]
     return f" at entry {step}" + "".join(f" of robot {number}" for number in robot)

@@ -25,7 +25,7 @@ def describe(env: GaitEnv, training: dict[str, Any]) -> PolicyInfo:
     return PolicyInfo(
         robot=env.robot.name,
         machine=env.machine.to_dict(),
-        observation={name: [s.start, s.stop] for name, s in env.observe.slices.items()},
+        observation={name: [s.start, s.stop] for name, s in env.walker.observation.slices.items()},
         action_scale=env.robot.action_scale,
         stance=list(env.robot.stance),
         gains=env.config.gains,

@@ -193,7 +193,7 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
 
 def _symmetry(env: GaitEnv) -> dict[str, Any]:
     """rsl_rl's augmentation: each batch followed by its mirror image."""
-    order, signs = (torch.from_numpy(part) for part in env.observe.mirror)
+    order, signs = (torch.from_numpy(part) for part in env.walker.observation.mirror)
     joint_order = torch.tensor(JOINT_MIRROR[0])
     joint_signs = torch.tensor(JOINT_MIRROR[1], dtype=torch.float32)
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import Command
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.state import Privileged, Proprioception
 
 BonusMode = Literal["add", "multiply_clipped", "multiply"]
 BONUS_MODES: tuple[BonusMode, ...] = ("add", "multiply_clipped", "multiply")
@@ -95,7 +95,8 @@ class RewardConfig:
 
 def walk_reward(
     config: RewardConfig,
-    motion: Motion,
+    sensed: Proprioception,
+    truth: Privileged,
     command: Command,
     *,
     stance: Float[np.ndarray, " 12"],
@@ -108,7 +109,8 @@ def walk_reward(
 
     Args:
         config: the weights.
-        motion: the motion after the step.
+        sensed: what robots sense after the step.
+        truth: what the simulator knows of it.
         command: what was asked for.
         stance: q_init [rad].
         agreement: share of the feet that are as the stance of the machine's state has them.
@@ -116,24 +118,27 @@ def walk_reward(
         action_change: action minus the action before it.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """
-    velocity = motion.base_linear_velocity_b
-    rate = motion.base_angular_velocity_b
+    velocity = truth.velocity_b
+    rate = sensed.need("angular_velocity_b", "the reward")
+    torque, joint_position, joint_velocity = (
+        sensed.need(f"joint_{name}", "the reward") for name in ("torque", "position", "velocity")
+    )
     sideways = velocity[:, 1:]
-    speed_error_squared = np.square(command.forward_speed - velocity[:, 0])
-    foot_speed_squared = _squares(motion.foot_velocity_w[..., :2])
+    speed_error_squared = np.square(command.forward_speed - truth.forward_speed)
+    foot_speed_squared = _squares(truth.foot_velocity_w[..., :2])
     terms = {
         "forward_velocity": config.forward_velocity * np.exp(-speed_error_squared),
         "lateral_velocity": config.lateral_velocity * _squares(sideways),
         "roll_pitch_rate": config.roll_pitch_rate * _squares(rate[:, :2]),
         "yaw_rate": config.yaw_rate * np.square(rate[:, 2] - command.yaw_rate),
-        "torque": config.torque * _squares(motion.joint_torque),
-        "joint_position": config.joint_position * _squares(motion.joint_position - stance),
-        "joint_velocity": config.joint_velocity * _squares(motion.joint_velocity),
+        "torque": config.torque * _squares(torque),
+        "joint_position": config.joint_position * _squares(joint_position - stance),
+        "joint_velocity": config.joint_velocity * _squares(joint_velocity),
         "speed_tracking": config.speed_tracking * np.exp(-speed_error_squared / TRACKING_WIDTH**2),
         "stance_feet": config.stance_feet * agreement,
         "stance_pattern": config.stance_pattern * (agreement == 1.0),
-        "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
-        "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
+        "slip": config.slip * (foot_speed_squared * sensed.contact).sum(axis=1),
+        "power": config.power * sensed.power,
         "chatter": config.chatter * chatter,
         "action_rate": config.action_rate * _squares(action_change),
     }

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gaitshift.control.policy import Policy
+from gaitshift.control import Controller
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.evaluation.evaluate import EvaluationConfig, run_policy
+from gaitshift.lab.evaluation.evaluate import EvaluationConfig, run_controller
 from gaitshift.lab.log import Log
 
 AMPLITUDES = (0.05, 0.07, 0.10, 0.15, 0.20)
@@ -72,14 +72,15 @@ def select(names: tuple[str, ...]) -> tuple[Course, ...]:
 
 
 def run_course(
-    policy: Policy,
+    controller: Controller,
     course: Course,
     *,
-    robots: int,
     seconds: float,
     seed: int,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
     """Robots in one gait on a course, on eight grounds of a seed where the ground is random."""
-    config = EvaluationConfig(terrain=course.terrain, episodes=robots, seconds=seconds, seed=seed)
-    return run_policy(policy, config, values=True, report=report)
+    config = EvaluationConfig(
+        terrain=course.terrain, episodes=controller.n, seconds=seconds, seed=seed
+    )
+    return run_controller(controller, config, values=True, report=report)

@@ -1,19 +1,19 @@
 """The demonstration: a robot that crosses a track and shifts its gait itself, or on a schedule."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from gaitshift.control import Autonomous, Controller, Driver, Scheduled, Switcher
-from gaitshift.control.cpg import GAITS, CpgController
-from gaitshift.control.policy import Policy
+from gaitshift.control import Autonomous, Scheduled, Switcher
+from gaitshift.control.controllers import ControllerMaker, controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
-from gaitshift.shift import GaitGraph, load_condition
+from gaitshift.shift import GaitGraph, between, load_graph, tuned
+from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.sim.terrain import Terrain, from_spec
 from gaitshift.sim.world import World
 
@@ -37,13 +37,14 @@ class DemoConfig:
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
     """The ground, piece by piece with lengths in metres; pieces as in `evaluate --terrain`."""
-    flat_gait: str = "trot"
-    """The gait on flat ground, and at the start."""
-    rough_gait: str = "bound"
-    """The gait on rough ground."""
-    condition: str = "touchdown_surprise"
-    """When to shift, by name: `touchdown_surprise`, which slopes and steps do not deceive;
-    `height_difference`, the paper's statistic with numbers of ours; `paper`, with its own."""
+    flat_gait: str = ""
+    """The gait on flat ground, and at the start; that of the graph by default."""
+    rough_gait: str = ""
+    """The gait on rough ground; that of the graph by default."""
+    graph: str = DEFAULT
+    """When to shift: a shipped gait graph by name, or a TOML file. `terrain`: slopes and steps do
+    not deceive it; `height_difference`: the paper's statistic with numbers of ours; `paper`: with its
+    own; all three between the two gaits above."""
     alpha: float | None = None
     """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
     beta: float | None = None
@@ -56,12 +57,9 @@ class DemoConfig:
     """β': shift back when k exceeds it [counts]."""
     hold: float | None = None
     """Least time in either gait [s]."""
-    controller: Literal["policy", "cpg"] = "policy"
-    """What walks: trained policies, or coupled oscillators that learned nothing (trot, pace, bound,
-    walk), which go slowly and for low noise alone."""
-    graph: str = ""
-    """A gait graph in place of the two gaits and their condition: a shipped one by name, or a
-    TOML file."""
+    controller: str = "policy"
+    """What walks, by name: `policy`, trained policies; `cpg`, coupled oscillators that learned
+    nothing (trot, pace, bound, walk), which go slowly and on low noise alone."""
     gaits: tuple[str, ...] = ()
     """Gaits to show in a row instead, on a schedule and without the condition."""
     every: float = 3.0
@@ -80,11 +78,6 @@ class DemoConfig:
             raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
         if not 0.2 <= self.every <= 60:
             raise GaitshiftError(f"a gait every {self.every} s: 0.2 to 60 s would be right")
-        given = [name for name in _NUMBERS if getattr(self, name) is not None]
-        if self.graph and given:
-            raise GaitshiftError(
-                f"a graph has its own numbers: change {given[0]} in its file, or leave --graph out"
-            )
         if len(self.gaits) == 1:
             raise GaitshiftError("one gait alone has nothing to shift to; give two or more")
 
@@ -109,31 +102,40 @@ class DemoConfig:
     @property
     def ways(self) -> GaitGraph:
         """The gait graph that the robots shift by; `GaitshiftError` where it cannot be had."""
-        if self.graph:
-            return GaitGraph.load(self.graph)
-        condition = load_condition(self.condition, **{k: getattr(self, k) for k in _NUMBERS})
-        return GaitGraph.of(condition, flat=self.flat_gait, rough=self.rough_gait)
+        graph = load_graph(self.graph)
+        gaits = {
+            "flat": self.flat_gait or graph.gaits[0],
+            "rough": self.rough_gait or graph.gaits[1],
+        }
+        if self.flat_gait or self.rough_gait:
+            graph = between(graph, **gaits)
+        return tuned(graph, **{name: getattr(self, name) for name in _NUMBERS})
 
 
 def run_demo(
     config: DemoConfig,
-    policies: Mapping[str, Policy],
     report: Callable[[int, int], None] = lambda done, total: None,
+    *,
+    make: ControllerMaker | None = None,
 ) -> tuple[Log, list[dict[str, Any]]]:
-    """Runs the demonstration: the log of all robots, and a summary for each."""
+    """Runs the demonstration: the log of all robots, and a summary for each.
+
+    `make` makes another controller than the one that the config names.
+    """
     n = config.episodes
     rng = np.random.default_rng(config.seed)
-    driver = _controller(config, policies)
+    used, make = config.used, make or controller_maker(config.controller)
+    controller = make(used, n)
     switcher = _switcher(config)
     grounds = [_ground(config, config.seed + i) for i in range(n)]
     finish = _finish(config, grounds[0])
-    slowest = _slowest(config, policies)
+    slowest = float(controller.repertoire.forward_speed.min())
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
-    world = World(driver.robot, grounds, n, gains=driver.gains)
+    world = World(controller.robot, grounds, n, gains=controller.gains)
     start = np.tile([START, 0.0], (n, 1))
     log = rollout(
         world,
-        driver,
+        controller,
         run,
         start_xy=start,
         rng=rng,
@@ -149,7 +151,7 @@ def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
 
     Survival, distance, mean speed, and every shift of gait.
     """
-    x = log.qpos[:, robot, 0]
+    x = log.truth.base_position_w[:, robot, 0]
     crossed = np.flatnonzero(x >= finish)
     end = int(crossed[0]) + 1 if crossed.size else len(x)
     gait = log.gait[:end, robot]
@@ -172,20 +174,6 @@ def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
             for t in shifts
         ],
     }
-
-
-def _controller(config: DemoConfig, policies: Mapping[str, Policy]) -> Controller:
-    used, n = config.used, config.episodes
-    if config.controller == "cpg":
-        return CpgController(used, n, start=used[0])
-    return Driver({gait: policies[gait] for gait in used}, n, start=used[0])
-
-
-def _slowest(config: DemoConfig, policies: Mapping[str, Policy]) -> float:
-    """Speed of the slowest gait that appears [m/s]."""
-    if config.controller == "cpg":
-        return min(GAITS[gait].speed for gait in config.used)
-    return min(policies[gait].info.forward_speed for gait in config.used)
 
 
 def _switcher(config: DemoConfig) -> Switcher:

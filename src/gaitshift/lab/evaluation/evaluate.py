@@ -11,7 +11,6 @@ from jaxtyping import Float
 from gaitshift.control import Controller, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait import gaits
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.gait_analysis import measure, robot_mass
 from gaitshift.lab.log import Log
@@ -76,8 +75,7 @@ def evaluate(
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[dict[str, Any], Log]:
     """Runs the deterministic policy and measures it (`gait_analysis.measure`)."""
-    log = run_policy(policy, config, report=report)
-    return measure(log, {policy.gait: policy.machine}, mass=robot_mass(policy.robot.name)), log
+    return evaluate_controller(_driver(policy, config), config, report)
 
 
 def evaluate_controller(
@@ -85,13 +83,10 @@ def evaluate_controller(
     config: EvaluationConfig,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[dict[str, Any], Log]:
-    """Runs robots that are all in one gait, and measures them by that gait's own machine.
-
-    Raises:
-        GaitshiftError: a gait of the controller has no machine of its name.
-    """
+    """Runs robots that are all in one gait, and measures them by that gait's own machine."""
     log = run_controller(controller, config, report=report)
-    machines = {name: gaits.load(name) for name in controller.gaits}
+    known = controller.repertoire
+    machines = dict(zip(known.gaits, known.machines, strict=True))
     return measure(log, machines, mass=robot_mass(controller.robot.name)), log
 
 
@@ -107,8 +102,12 @@ def run_policy(
 
     With `values` the log keeps what the policy's critic expects.
     """
-    driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
+    driver = _driver(policy, config)
     return run_controller(driver, config, finish_x=finish_x, values=values, report=report)
+
+
+def _driver(policy: Policy, config: EvaluationConfig) -> Driver:
+    return Driver({policy.gait: policy}, config.episodes, start=policy.gait)
 
 
 def run_controller(
@@ -129,7 +128,7 @@ def run_controller(
         speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
         values=values,
     )
-    own = float(controller.own_command().forward_speed.max())
+    own = float(controller.repertoire.own_command(controller.gait).forward_speed.max())
     speed = own if config.speed is None else config.speed
     grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
     world = World(controller.robot, grounds, controller.n, gains=controller.gains)
@@ -150,7 +149,8 @@ def starts(controller: Controller, rng: np.random.Generator) -> Float[np.ndarray
     Spread over the width, so that robots on one field do not walk over the same ground, and over a
     stride, so that they meet an edge at all instants of it.
     """
-    n, command = controller.n, controller.own_command()
+    n = controller.n
+    command = controller.repertoire.own_command(controller.gait)
     stride = command.forward_speed / command.stride_frequency
     start = np.zeros((n, 2))
     start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, n)

@@ -211,14 +211,14 @@ def _outcomes(
 def distances(log: Log) -> Float[np.ndarray, " N"]:
     """How far along x each robot came before it fell or time was up [m]."""
     last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
-    x = log.qpos[..., 0].astype(float)
+    x = log.truth.base_position_w[..., 0].astype(float)
     return np.take_along_axis(x, last[None], axis=0)[0] - x[0]
 
 
 def lateral_errors(log: Log, distance: float) -> Float[np.ndarray, " N"]:
     """How far each robot is from its line when it has gone `distance` [m]; inf if it never has."""
-    there: Bool[np.ndarray, "T N"] = (log.qpos[..., 0] >= distance) & ~log.fallen
-    y = log.qpos[..., 1].astype(float)
+    there: Bool[np.ndarray, "T N"] = (log.truth.base_position_w[..., 0] >= distance) & ~log.fallen
+    y = log.truth.base_position_w[..., 1].astype(float)
     first = there.argmax(axis=0)[None]
     error = np.abs(np.take_along_axis(y, first, axis=0)[0] - y[0])
     return np.where(there.any(axis=0), error, np.inf)

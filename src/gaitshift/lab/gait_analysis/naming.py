@@ -73,4 +73,4 @@ def _rhythm(phases: Phases, machine: RewardMachine) -> float:
 
 
 def _pattern(sample: Sample, machine: RewardMachine) -> float:
-    return share_in_order(sample.log.contact, sample.alive, machine)
+    return share_in_order(sample.log.sensed.contact, sample.alive, machine)

@@ -29,7 +29,7 @@ class Sample:
     def of(cls, log: Log, warm_up: float = WARM_UP) -> "Sample":
         """The sample of a whole log; empty where the log is no longer than the warm-up [s]."""
         begin = int(np.searchsorted(log.time, warm_up, side="right"))
-        return cls(log=log.part(slice(begin, None)), whole=log)
+        return cls(log=log[begin:], whole=log)
 
     @property
     def period(self) -> float:
@@ -50,17 +50,17 @@ class Sample:
     @cached_property
     def contact(self) -> Bool[np.ndarray, "L N 4"]:
         """Feet that are down, of robots on their feet; as they were logged."""
-        return self.log.contact & self.alive[..., None]
+        return self.log.sensed.contact & self.alive[..., None]
 
     @cached_property
     def onsets(self) -> Bool[np.ndarray, "L N 4"]:
         """Where a foot is down that was up in the step before: every contact, bounces too."""
-        return self._late(onsets(self.whole.contact)) & self.alive[..., None]
+        return self._late(onsets(self.whole.sensed.contact)) & self.alive[..., None]
 
     @cached_property
     def touchdowns(self) -> Bool[np.ndarray, "L N 4"]:
         """Where a foot ends a swing: onsets that are no bounce (`steps.steady`)."""
-        steps = onsets(steady(self.whole.contact, self.period))
+        steps = onsets(steady(self.whole.sensed.contact, self.period))
         return self._late(steps) & self.alive[..., None]
 
     def entries(self, machines: Mapping[str, RewardMachine]) -> Bool[np.ndarray, "L N"]:

@@ -5,9 +5,9 @@ from gaitshift.lab.identification.choice import choose as choose
 from gaitshift.lab.identification.grid import counters as counters
 from gaitshift.lab.identification.grid import counts_at as counts_at
 from gaitshift.lab.identification.grid import first_firings as first_firings
+from gaitshift.lab.identification.labelled_run import LabelledRun as LabelledRun
 from gaitshift.lab.identification.labels import is_rough as is_rough
 from gaitshift.lab.identification.labels import rough_ground as rough_ground
-from gaitshift.lab.identification.recording import Recording as Recording
 from gaitshift.lab.identification.scores import Detections as Detections
 from gaitshift.lab.identification.scores import FalseShifts as FalseShifts
 from gaitshift.lab.identification.scores import detections as detections

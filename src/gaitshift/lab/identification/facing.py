@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.lab.identification.recording import Recording, Way
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 
 
 def facing(
-    recording: Recording, values: Float[np.ndarray, "T N M"], way: Way
-) -> tuple[Recording, Float[np.ndarray, "T N M"]]:
+    recording: LabelledRun, values: Float[np.ndarray, "T N M"], way: Way
+) -> tuple[LabelledRun, Float[np.ndarray, "T N M"]]:
     """The recording with what is to be noticed as its rough ground, and the values beside it.
 
     Each robot begins where it first comes to the other ground: smooth, on the way to rough ground,

@@ -10,8 +10,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.chatter import Said, chattered, ever_fires, in_turn, shifts
 from gaitshift.lab.identification.facing import facing
 from gaitshift.lab.identification.grid import first_firings, steps_alive
+from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.lab.identification.passage import longest_passage, passage_scores
-from gaitshift.lab.identification.recording import Recording
 from gaitshift.lab.identification.scores import detections
 from gaitshift.lab.identification.statistics import auc, auc_interval
 from gaitshift.lab.identification.tally import Tally, join_by_name
@@ -110,7 +110,7 @@ class Judged:
         return np.array([float(x) for course in self.courses for x in course.scores[False]])
 
 
-def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[Recording]) -> Replayed:
+def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[LabelledRun]) -> Replayed:
     """Replays each condition with its numbers, course by course.
 
     Raises:
@@ -166,7 +166,9 @@ def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
     ]
 
 
-def _add(course: OnCourse, one: Tuned, seen: Recording, values: Float[np.ndarray, "T N M"]) -> None:
+def _add(
+    course: OnCourse, one: Tuned, seen: LabelledRun, values: Float[np.ndarray, "T N M"]
+) -> None:
     """Takes in how a condition did on a recording that shows what it is to notice (`facing`)."""
     alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
     first = first_firings(values, seen.alive, one.rule, alpha, beta)

@@ -21,7 +21,7 @@ def rough_ground(log: Log) -> Bool[np.ndarray, "T N"]:
         GaitshiftError: the name of the ground cannot be read.
     """
     x0, length = float(log.terrain_origin[0]), float(log.terrain_size[0])
-    return is_rough(log.qpos[..., 0], log.terrain, x0, length)
+    return is_rough(log.truth.base_position_w[..., 0], log.terrain, x0, length)
 
 
 def is_rough(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift.lab.identification.chatter import SHIPPED, shipped_rule
+from gaitshift.lab.identification.chatter import shipped_rule
 from gaitshift.lab.identification.choice import Choice
 from gaitshift.lab.identification.judging import Judged, OnCourse
 from gaitshift.lab.identification.passage import LENGTH
@@ -90,8 +90,8 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
         f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course, at "
         f"{_area_words(tuned.choice)}. Chattered: robots that would have shifted more than once "
         f"there and once back for each rough stretch, had they taken the shipped way {other} "
-        f"({SHIPPED}'s: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak {stand_in.leak:g}); the "
-        "gait of the logs stayed. Intervals are of 95 %."
+        f"(the default graph's: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak "
+        f"{stand_in.leak:g}); the gait of the logs stayed. Intervals are of 95 %."
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from gaitshift.lab.identification.grid import steps_alive
-from gaitshift.lab.identification.recording import Recording
+from gaitshift.lab.identification.labelled_run import LabelledRun
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,7 +35,7 @@ class FalseShifts:
     """Way that was walked until firing or to the end [km]."""
 
 
-def detections(recording: Recording, first: Int[np.ndarray, "N A B"]) -> Detections:
+def detections(recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> Detections:
     """How the firings `first` of one recording met its first stretch of rough ground."""
     entry, end = _stretch(recording)
     came = (entry[:, None, None] < end[:, None, None]) & (first >= entry[:, None, None])
@@ -55,7 +55,7 @@ def detections(recording: Recording, first: Int[np.ndarray, "N A B"]) -> Detecti
     )
 
 
-def false_shifts(recording: Recording, first: Int[np.ndarray, "N A B"]) -> FalseShifts:
+def false_shifts(recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> FalseShifts:
     """The firings before any rough ground, and the way walked until then."""
     entry, _ = _stretch(recording)
     limit = np.minimum(entry, steps_alive(recording.alive))[:, None, None]
@@ -67,7 +67,7 @@ def false_shifts(recording: Recording, first: Int[np.ndarray, "N A B"]) -> False
     )
 
 
-def _stretch(recording: Recording) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
+def _stretch(recording: LabelledRun) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
     """Steps at which each robot comes to its first rough ground, and leaves it; T if never."""
     steps = len(recording.time)
     rough = recording.rough & recording.alive

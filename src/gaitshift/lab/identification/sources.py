@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 from gaitshift.lab.identification.labels import rough_ground
-from gaitshift.lab.identification.recording import Recording, Way
 from gaitshift.lab.identification.table import passages
 from gaitshift.lab.log import Log
 
@@ -27,7 +27,7 @@ def check_sources(paths: Sequence[Path]) -> None:
             )
 
 
-def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[Recording]:
+def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[LabelledRun]:
     """What the files hold, one after the other, tables passage by passage for this way.
 
     A recording has the name of its file, less a seed at its end.
@@ -40,8 +40,8 @@ def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[Recording]
             yield from passages(path, way)
             continue
         log = Log.load(path)
-        if not log.contact.any():
+        if not log.sensed.contact.any():
             raise GaitshiftError(
                 f"{path}: no foot ever touches; 'contact' is true where one is down"
             )
-        yield Recording.from_log(log, _SEED.sub("", path.stem), rough_ground(log))
+        yield LabelledRun.from_log(log, _SEED.sub("", path.stem), rough_ground(log))

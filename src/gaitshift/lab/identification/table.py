@@ -1,7 +1,6 @@
 """Logs of anybody's robot: CSV or Parquet, read in a stream and cut into passages."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -9,9 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.recording import Recording, Way
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
-from gaitshift.robot.legs import LEGS
+from gaitshift.robot.legs import JOINTS, LEGS
+from gaitshift.robot.state import Proprioception, orientation_of
 from gaitshift.shift import LegOdometry
 
 _AXES = ("x", "y", "z")
@@ -26,8 +26,15 @@ ATTITUDES = (tuple(f"gravity_{axis}" for axis in _AXES), ("roll", "pitch"))
 VECTORS = {"velocity_b": "velocity", "angular_velocity_b": "angular_velocity"}
 """Optional signals of three columns: `velocity_x` and so on, body frame [m/s], [rad/s]."""
 
-SCALARS = ("yaw", "power", "speed_command", "stride", "value")
-"""Optional signals of one column each; units as in `Signals`."""
+SCALARS = {
+    "forward_speed_command": "speed_command",
+    "stride_frequency_command": "stride_frequency",
+    "value": "value",
+}
+"""Optional signals of one column each [m/s], [Hz]; there is `yaw` [rad] beside them."""
+
+_JOINTS = ("joint_position", "joint_velocity", "joint_torque")
+"""Optional signals of twelve columns: `joint_torque_FL_HAA` and so on [rad], [rad/s], [N·m]."""
 
 BATCH, BLOCK = 65_536, 1 << 24
 """What is read at a time: rows of a Parquet file, bytes of a CSV file."""
@@ -41,18 +48,23 @@ _LEAST_GRAVITY = 1e-6
 _KNOWN = (
     *REQUIRED,
     *(name for names in ATTITUDES for name in names),
-    *SCALARS,
+    "yaw",
+    *SCALARS.values(),
     *(f"{prefix}_{axis}" for prefix in VECTORS.values() for axis in _AXES),
+    *(f"{prefix}_{leg}_{joint}" for prefix in _JOINTS for leg in LEGS for joint in JOINTS),
 )
 
 
 def columns_of(signal: str) -> tuple[str, ...]:
     """Columns that an optional signal is read from."""
-    prefix = VECTORS.get(signal)
-    return (signal,) if prefix is None else tuple(f"{prefix}_{axis}" for axis in _AXES)
+    if signal in VECTORS:
+        return tuple(f"{VECTORS[signal]}_{axis}" for axis in _AXES)
+    if signal in _JOINTS:
+        return tuple(f"{signal}_{leg}_{joint}" for leg in LEGS for joint in JOINTS)
+    return (SCALARS.get(signal, signal),)
 
 
-def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
+def passages(path: Path, way: Way = "rough") -> Iterator[LabelledRun]:
     """The passages of a log: smooth ground up to where it ends, and the rough ground behind it.
 
     On the way to flat ground it is rough ground, and the smooth ground behind it. Rough ground that
@@ -217,27 +229,32 @@ def _ends(rough: np.ndarray) -> list[int]:
     return sorted([*ends, *cuts])
 
 
-def _recording(path: Path, columns: dict[str, np.ndarray], rows: slice) -> Recording:
+def _recording(path: Path, columns: dict[str, np.ndarray], rows: slice) -> LabelledRun:
     """One robot over these rows."""
     cut = {name: values[rows] for name, values in columns.items()}
-    optional: dict[str, Any] = {name: cut[name][:, None] for name in SCALARS if name in cut}
-    for name, prefix in VECTORS.items():
-        parts = [f"{prefix}_{axis}" for axis in _AXES]
-        if all(part in cut for part in parts):
-            optional[name] = np.stack([cut[part] for part in parts], axis=1)[:, None]
-    steps = len(cut["time"])
-    recording = Recording(
-        name=path.name,
-        time=cut["time"],
+    optional = dict[str, Any]()
+    for signal in (*SCALARS, *VECTORS, *_JOINTS):
+        names = columns_of(signal)
+        if all(name in cut for name in names):
+            values = np.stack([cut[name] for name in names], axis=1)
+            optional[signal] = values if signal in SCALARS else values[:, None]
+    steps, time = len(cut["time"]), cut["time"]
+    sensed = Proprioception(
         contact=np.stack([cut[name] > 0.5 for name in CONTACTS], axis=1)[:, None],
         foot_position_b=np.stack([cut[name] for name in FEET], axis=1).reshape(steps, 1, 4, 3),
-        gravity_b=_gravity(cut)[:, None],
-        rough=cut["rough"][:, None] > 0.5,
-        alive=np.ones((steps, 1), dtype=bool),
-        distance=np.zeros((steps, 1)),
+        orientation=orientation_of(_gravity(cut), cut.get("yaw", 0.0))[:, None],
+        has_heading="yaw" in cut,
+        time=time,
+        period=float(time[1] - time[0]),
         **optional,
     )
-    return _with_distance(recording)
+    return LabelledRun(
+        name=path.name,
+        sensed=sensed,
+        rough=cut["rough"][:, None] > 0.5,
+        alive=np.ones((steps, 1), dtype=bool),
+        distance=_distance(sensed),
+    )
 
 
 def _gravity(columns: dict[str, np.ndarray]) -> Float[np.ndarray, "T 3"]:
@@ -251,12 +268,12 @@ def _gravity(columns: dict[str, np.ndarray]) -> Float[np.ndarray, "T 3"]:
     return np.stack([np.sin(pitch), -np.sin(roll) * level, -np.cos(roll) * level], axis=1)
 
 
-def _with_distance(recording: Recording) -> Recording:
-    """The same with the way that leg odometry makes of it."""
-    odometry = LegOdometry()
-    state, base = odometry.start(1), np.empty((len(recording.time), 2))
-    for t, signals in enumerate(recording):
-        state, _ = odometry.step(state, signals)
+def _distance(sensed: Proprioception) -> Float[np.ndarray, "T 1"]:
+    """The way that one robot has come, by leg odometry [m]."""
+    odometry, steps = LegOdometry(), len(sensed.contact)
+    state, base = odometry.start(1), np.empty((steps, 2))
+    for t in range(steps):
+        state, _ = odometry.step(state, sensed[t])
         base[t] = state.base[0, :2]
     step = np.linalg.norm(np.diff(base, axis=0, prepend=base[:1]), axis=1)
-    return replace(recording, distance=step.cumsum()[:, None])
+    return step.cumsum()[:, None]

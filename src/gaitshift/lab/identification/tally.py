@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from gaitshift.lab.identification.grid import first_firings
-from gaitshift.lab.identification.recording import Recording
+from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.lab.identification.scores import detections, false_shifts
 from gaitshift.shift import AnyStatistic, Rule
 
@@ -53,7 +53,7 @@ class Tally:
         self.came, self.detected, self.fired = (np.zeros(self.shape, dtype=int) for _ in range(3))
         self.seconds, self.metres, self.km = (np.zeros(self.shape) for _ in range(3))
 
-    def add(self, recording: Recording, first: Int[np.ndarray, "N A B"]) -> None:
+    def add(self, recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> None:
         """Takes in the firings of one recording."""
         found, wrong = detections(recording, first), false_shifts(recording, first)
         self.came += found.came
@@ -112,7 +112,7 @@ def join_by_name(mine: dict[str, Part], others: Mapping[str, Part]) -> None:
 
 
 def replay(
-    recordings: Iterable[Recording], statistic: AnyStatistic, rule: Rule, grid: Grid
+    recordings: Iterable[LabelledRun], statistic: AnyStatistic, rule: Rule, grid: Grid
 ) -> dict[str, Tally]:
     """What a rule does at each α and β, by the names of the recordings."""
     tallies: dict[str, Tally] = {}

@@ -8,8 +8,8 @@ from gaitshift.lab.identification.candidates import BETAS, Candidate
 from gaitshift.lab.identification.choice import Choice, choose
 from gaitshift.lab.identification.facing import facing
 from gaitshift.lab.identification.grid import first_firings
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 from gaitshift.lab.identification.passage import GridScores, best_beta, passage_grid
-from gaitshift.lab.identification.recording import Recording, Way
 from gaitshift.lab.identification.tally import Grid, Tally, join_by_name
 from gaitshift.shift import Rule
 
@@ -85,7 +85,9 @@ class Tried:
                 join_by_name(self.found.setdefault(name, {}).setdefault(leak, {}), by_course)
 
 
-def try_grids(candidates: Sequence[Candidate], recordings: Iterable[Recording], way: Way) -> Tried:
+def try_grids(
+    candidates: Sequence[Candidate], recordings: Iterable[LabelledRun], way: Way
+) -> Tried:
     """Replays each candidate that a recording feeds, at each α, β and leak that it is tried at."""
     tried = Tried(way=way)
     for recording in recordings:

@@ -15,8 +15,8 @@ from gaitshift.lab.gait_analysis import robot_mass
 from gaitshift.lab.identification import is_rough
 from gaitshift.lab.log import Log
 from gaitshift.lab.studies.batches import in_batches
-from gaitshift.robot.motion import GRAVITY, Motion
-from gaitshift.shift import Condition, GaitGraph, Oracle, load_condition
+from gaitshift.robot.state import GRAVITY, Privileged
+from gaitshift.shift import GaitGraph, between, load_graph
 from gaitshift.sim.world import World
 
 BEFORE, NOISE, AFTER = 4.0, 15.0, 5.0
@@ -48,14 +48,12 @@ class Way:
 
 def ways(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Way, ...]:
     """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
-    seen = Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0)
-    by = {name: load_condition(name) for name in conditions} | {"oracle": seen}
     return (
         Way(f"{flat} only", flat),
         Way(f"{rough} only", rough),
         *(
-            Way(name, flat, GaitGraph.of(condition, flat=flat, rough=rough))
-            for name, condition in by.items()
+            Way(name, flat, between(load_graph(name), flat=flat, rough=rough))
+            for name in dict.fromkeys((*conditions, "oracle"))
         ),
     )
 
@@ -111,8 +109,8 @@ def _batch(
     world = World(driver.robot, grounds, n, gains=driver.gains)
     name, x0, length = grounds[0].name, grounds[0].origin[0], grounds[0].size[0]
 
-    def sees(motion: Motion) -> Bool[np.ndarray, " N"]:
-        return is_rough(motion.base_position_w[:, 0], name, x0, length)
+    def rough(truth: Privileged) -> Bool[np.ndarray, " N"]:
+        return is_rough(truth.base_position_w[:, 0], name, x0, length)
 
     start = starts(driver, rng)
     log = rollout(
@@ -121,7 +119,7 @@ def _batch(
         RolloutConfig(seconds=seconds),
         start_xy=start,
         rng=rng,
-        switcher=None if way.graph is None else Autonomous(way.graph, n, sees=sees),
+        switcher=None if way.graph is None else Autonomous(way.graph, n, rough=rough),
         finish_x=float(start[:, 0].max()) + way_to_go,
     )
     return measure_crossings(log, way_to_go)
@@ -129,7 +127,7 @@ def _batch(
 
 def measure_crossings(log: Log, way_to_go: float) -> Crossings:
     """What a log says of its robots, each on a way of this length from where it starts [m]."""
-    x = log.qpos[..., 0].astype(float) - log.qpos[0, :, 0]
+    x = log.truth.base_position_w[..., 0].astype(float) - log.truth.base_position_w[0, :, 0]
     over = ((x >= way_to_go) | log.fallen).cumsum(axis=0) > 0
     # entries until the finish, the fall or the end, itself included
     count = np.minimum((~over).sum(axis=0) + 1, len(x))
@@ -139,7 +137,7 @@ def measure_crossings(log: Log, way_to_go: float) -> Crossings:
     distance = np.clip(x[last, robots], 0.0, way_to_go)
     period = float(log.time[1] - log.time[0])
     going = np.arange(len(x))[:, None] < count
-    power = np.abs(log.torque * log.qvel[..., 6:]).sum(axis=-1).astype(float)
+    power = log.sensed.power.astype(float)
     work = (power * going).sum(axis=0) * period
     weight = robot_mass(log.robot) * GRAVITY
     far = distance >= 1.0

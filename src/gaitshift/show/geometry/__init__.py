@@ -2,7 +2,6 @@
 
 from gaitshift.show.geometry.frame import Frame as Frame
 from gaitshift.show.geometry.frame import frames_of as frames_of
-from gaitshift.show.geometry.frame import last_touches as last_touches
 from gaitshift.show.geometry.frame import plane_corners as plane_corners
 from gaitshift.show.geometry.ground import ground_grid as ground_grid
 from gaitshift.show.geometry.ground import ground_mesh as ground_mesh

@@ -67,7 +67,7 @@ def _write_gaits(axes: Axes, log: Log, robot: int) -> None:
 def _write_shares(axes: Axes, log: Log, robot: int) -> None:
     """How long each foot stood, right of its lane."""
     right = axes.get_xlim()[1]
-    for leg, share in enumerate(log.contact[:, robot].mean(axis=0)):
+    for leg, share in enumerate(log.sensed.contact[:, robot].mean(axis=0)):
         axes.annotate(
             f"{100 * share:.0f} %",
             (right, leg),

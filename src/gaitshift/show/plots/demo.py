@@ -136,7 +136,11 @@ def _write_head(figure: Figure, log: Log, robot: int) -> None:
     shifted = f"{count or 'no'} gait shift{'' if count == 1 else 's'}"
     seconds = float(log.time[-1]) if fell is None else fell
     words = f"{shifted} in {seconds:.1f} s" + ("" if fell is None else ", then a fall")
-    metres = float(np.linalg.norm(log.qpos[-1, robot, :2] - log.qpos[0, robot, :2]))
+    metres = float(
+        np.linalg.norm(
+            log.truth.base_position_w[-1, robot, :2] - log.truth.base_position_w[0, robot, :2]
+        )
+    )
     detail = f"{log.robot}, {metres:.1f} m on {log.terrain.replace(',', ', ')}"
     page, left = float(figure.get_figheight()), _LEFT / _WIDTH
     figure.text(left, 1 - 0.30 / page, words, size=19, weight="bold", va="center")

@@ -76,7 +76,10 @@ _SHIFT_HEAD = ("at", "where", "from", "to", "k")
 def _summary(log: Log, robot: int) -> str:
     fell = fall_time(log, robot)
     seconds = float(log.time[-1]) if fell is None else fell
-    way = float(log.qpos[np.searchsorted(log.time, seconds) - 1, robot, 0] - log.qpos[0, robot, 0])
+    way = float(
+        log.truth.base_position_w[np.searchsorted(log.time, seconds) - 1, robot, 0]
+        - log.truth.base_position_w[0, robot, 0]
+    )
     count = len(shift_times(log, robot))
     shifts = "no shift of gait" if count == 0 else f"{count} shift{'s' * (count > 1)} of gait"
     end = "on its feet to the end" if fell is None else f"fallen after {fell:.1f} s"
@@ -88,7 +91,7 @@ def _shifts(log: Log, robot: int) -> list[Row]:
     for (before, _), (after, span) in zip(
         gait_spans(log, robot), gait_spans(log, robot)[1:], strict=False
     ):
-        x = float(log.qpos[span.entry, robot, 0])
+        x = float(log.truth.base_position_w[span.entry, robot, 0])
         k = f"{log.k[span.entry, robot]:.4g} of {log.threshold[span.entry, robot]:.4g}"
         cells = (f"{span.begin:.2f} s", f"{x:.2f} m", title_of(before), title_of(after), k)
         rows.append((cells, max(span.begin - 1.0, 0.0)))
@@ -106,7 +109,7 @@ def stretches(log: Log, robot: int) -> list[Row]:
             rows.append(((*cells, "too short to judge", "", "", ""), span.begin))
             continue
         end = int(np.searchsorted(log.time, span.end - 1e-9))
-        figures = _judged(alone.part(slice(span.entry, end)), machines)
+        figures = _judged(alone[span.entry : end], machines)
         verdict, misses = figures["verdict"], [m["figure"] for m in figures["verdict"]["misses"]]
         named = title_of(verdict["gait"]) if verdict["gait"] != "none" else "no gait"
         cells += [f"{named}{', clean' if verdict['clean'] else ''}"]

@@ -23,7 +23,7 @@ than a stride, so that the camera does not bob with the body."""
 def follow(log: Log, robot: int) -> list[View]:
     """The view at each entry of the log."""
     step = period(log)
-    x, y, z = log.qpos[:, robot, :3].T
+    x, y, z = log.truth.base_position_w[:, robot, :3].T
     yaw = smoothed(np.unwrap(_heading(log, robot)), step, _TURN)
     course = zip(
         smoothed(x, step, _ALONG).tolist(),
@@ -39,5 +39,4 @@ def follow(log: Log, robot: int) -> list[View]:
 
 
 def _heading(log: Log, robot: int) -> np.ndarray:
-    w, x, y, z = log.qpos[:, robot, 3:7].T
-    return np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+    return log.sensed.yaw[:, robot]

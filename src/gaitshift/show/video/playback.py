@@ -24,10 +24,15 @@ class Playback:
 
     def __init__(self, log: Log, robot: int, width: int, height: int) -> None:
         self._log, self._robot = log, robot
+        self._qpos = log.qpos[:, robot]
         self._radius = ROBOTS[log.robot].foot_radius
         self._colours = gait_colours(log.gaits)
         stage = build_stage(
-            ROBOTS[log.robot], ground_of(log), log.qpos[:, robot, :2], width, height
+            ROBOTS[log.robot],
+            ground_of(log),
+            log.truth.base_position_w[:, robot, :2],
+            width,
+            height,
         )
         self._texture = stage.texture
         self._model, self._data = stage.model, mujoco.MjData(stage.model)
@@ -44,7 +49,7 @@ class Playback:
 
     def picture(self, entry: int) -> UInt8[np.ndarray, "height width 3"]:
         """The robot at an entry, the prints of all touches up to it on the ground."""
-        self._data.qpos[:] = self._log.qpos[entry, self._robot]
+        self._data.qpos[:] = self._qpos[entry]
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         self._print_touches(entry)
@@ -54,22 +59,22 @@ class Playback:
 
     def _print_touches(self, entry: int) -> None:
         """Leaves the prints of the touches since the last picture."""
-        contact = self._log.contact[:, self._robot]
+        contact = self._log.sensed.contact[:, self._robot]
         for now in range(self._printed, entry + 1):
             touching = contact[now] & ~contact[now - 1] if now else contact[now]
             for leg in np.flatnonzero(touching).tolist():
-                xy = self._log.foot_position_w[now, self._robot, leg, :2]
+                xy = self._log.truth.foot_position_w[now, self._robot, leg, :2]
                 self._paint.add_footprint(xy, self._colour(now))
         self._printed = entry + 1
 
     def _lights(self, entry: int) -> list[Ball]:
         """A light on each foot that touches, in the gait's colour."""
-        feet = self._log.foot_position_w[entry, self._robot] + [0.0, 0.0, self._radius]
+        feet = self._log.truth.foot_position_w[entry, self._robot] + [0.0, 0.0, self._radius]
         red, green, blue = (v / 255 for v in ImageColor.getrgb(self._colour(entry))[:3])
         return [
             Ball(position=feet[leg], radius=_GLOW * self._radius, rgba=(red, green, blue, 1.0))
             for leg in range(len(LEGS))
-            if self._log.contact[entry, self._robot, leg]
+            if self._log.sensed.contact[entry, self._robot, leg]
         ]
 
     def _colour(self, entry: int) -> str:

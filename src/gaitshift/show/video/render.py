@@ -11,7 +11,6 @@ from gaitshift.robot.description import ROBOTS
 from gaitshift.show.plots.palette import gait_colours
 from gaitshift.show.plots.signals import (
     check_robot,
-    forward_speed,
     gait_at,
     period,
     smoothed,
@@ -99,7 +98,7 @@ def _entries(log: Log, fps: int) -> list[int]:
 def _readings(log: Log, robot: int) -> list[Reading]:
     """What the strip tells at each entry."""
     colours = gait_colours(log.gaits)
-    speed = smoothed(forward_speed(log, robot), period(log), _SPEED_SIGMA)
+    speed = smoothed(log.truth.forward_speed[:, robot], period(log), _SPEED_SIGMA)
     gaits = [gait_at(log, robot, entry) for entry in range(len(log.time))]
     return [
         Reading(

@@ -50,7 +50,7 @@ class Charts:
         self._counter.data = (time, *counter(tape))
         self._heights.data = (time, *foot_heights(tape).T)
         self._speed.data = (time, tape.of("speed").astype(float))
-        gait, state = int(last.gait[tape.robot]), int(last.machine_state[tape.robot])
+        gait, state = int(last.step.gait[tape.robot]), int(last.step.machine_state[tape.robot])
         machine = self._machines[gait]
         self._machine.content = (
             "" if machine is None else machine_svg(machine, state, self._colours[gait])
@@ -93,8 +93,7 @@ def counter(tape: Tape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def foot_heights(tape: Tape) -> np.ndarray:
     """Heights of the last touches (T, 4) [m]; NaN of a foot that has not touched yet."""
-    touched = np.isfinite(tape.of("touch_w")[..., 0])
-    return np.where(touched, tape.of("foot_height"), np.nan)
+    return tape.of("touch_height")
 
 
 def contact_svg(tape: Tape, colours: tuple[str, ...]) -> str:

@@ -33,7 +33,7 @@ class ReplayPage:
         self._frames = frames_of(_few(log), _EVERY)
         self._scene = Scene(server, ROBOTS[log.robot], log.gaits)
         self._scene.set_ground(ground_of(log))
-        self._scene.set_robots(len(self._frames[0].qpos))
+        self._scene.set_robots(self._frames[0].step.n)
         self._tape, self._at, self._plays = Tape(), 0, True
         self._factor, self._owed = 1.0, 0.0
         self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -78,7 +78,7 @@ class ReplayPage:
         panel.dock_left()
         panel.set_width(340)
         end = self._frames[-1].time
-        n = len(self._frames[0].qpos)
+        n = self._frames[0].step.n
         gui.add_markdown(f"{log.terrain} · {n} robot{'s' if n > 1 else ''} · {end:.1f} s")
         play = gui.add_button("pause")
         self._slider = gui.add_slider(
@@ -115,4 +115,4 @@ def _machines(log: Log) -> Mapping[str, RewardMachine | None]:
 
 def _few(log: Log) -> Log:
     """The first robots of a log, as many as a page shows."""
-    return log if log.k.shape[1] <= MOST_ROBOTS else log.robots(slice(0, MOST_ROBOTS))
+    return log if log.n <= MOST_ROBOTS else log.robots(slice(0, MOST_ROBOTS))

@@ -1,10 +1,22 @@
 """The last seconds of a robot, for charts."""
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
 from gaitshift.show.geometry import Frame
+
+_QUANTITIES: dict[str, Callable[[Frame], np.ndarray]] = {
+    "contact": lambda frame: frame.step.sensed.contact,
+    "touch_height": lambda frame: frame.touch_height,
+    "speed": lambda frame: frame.step.truth.forward_speed,
+    "k": lambda frame: frame.step.k,
+    "threshold": lambda frame: frame.step.threshold,
+    "gait": lambda frame: frame.step.gait,
+    "machine_state": lambda frame: frame.step.machine_state,
+}
+"""What charts show, by name."""
 
 WINDOW = 8.0
 """Charts show this much of the past [s]."""
@@ -38,4 +50,4 @@ class Tape:
         """A quantity of the robot over the window, time first; of `time` itself: [s]."""
         if name == "time":
             return np.array([frame.time for frame in self._frames])
-        return np.array([getattr(frame, name)[self.robot] for frame in self._frames])
+        return np.array([_QUANTITIES[name](frame)[self.robot] for frame in self._frames])

@@ -10,11 +10,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
-from gaitshift.control.observation import Observation, Situation, last_touch
+from gaitshift.control.observation import GaitState, Observation
+from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import ACTION_LIMIT
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.state import Privileged
 from gaitshift.sim.env.commander import Commander
 from gaitshift.sim.env.config import EnvConfig
 from gaitshift.sim.env.mixed_start import MixedStart, mix
@@ -51,7 +52,12 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.machine = machine
         self.robot = robot
         self.num_envs = num_envs
-        self.observe = Observation(machine, self.config.observed)
+        self.walker = Walker(
+            machine=machine,
+            observation=Observation(machine, robot.stance, self.config.observed),
+            action_scale=robot.action_scale,
+        )
+        """What robots observe, what their actions mean, how the machine moves on."""
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
         self.strictness = 1.0
         """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
@@ -67,7 +73,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         those that begin while others go on."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
-            -np.inf, np.inf, (self.observe.size,), np.float32
+            -np.inf, np.inf, (self.walker.observation.size,), np.float32
         )
         self.single_action_space = gym.spaces.Box(-ACTION_LIMIT, ACTION_LIMIT, (12,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -94,25 +100,26 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         dict[str, Any],
     ]:
         """One control step of 10 ms; `actions` scale to joint targets about the stance."""
-        action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
+        action, target = self.walker.target(actions)
         self.world.push(self._pusher.step())
-        motion = self.world.step(self._stance + self.robot.action_scale * action)
-        dwell = self.machine.dwell_for(self._commander.command.stride)
-        step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
-        on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
-        chatter, swing_share = self._swings.see(self._state, step, motion, self.swing_factor)
-        self._touch_height = last_touch(motion, self._touch_height)
-        self._state = step.state
-        self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
-        agreement = self.machine.agreement(self._state, motion.contact)
+        sensed, truth = self.world.step(target)
+        command, before = self._commander.command, self._state
+        self._state, step = self.walker.step(before, action, sensed, command)
+        left, waited = before.machine_state, before.steps_in_state
+        on_time = self.machine.punctuality(left, waited, self.machine.dwell_for(command.stride))
+        chatter, swing_share = self._swings.see(
+            left, step, sensed.contact, truth.clearance, self.swing_factor
+        )
+        agreement = self.machine.agreement(step.state, sensed.contact)
         terms = walk_reward(
             self.config.reward,
-            motion,
-            self._commander.command,
+            sensed,
+            truth,
+            command,
             stance=self._stance,
             agreement=agreement,
             chatter=self.strictness * chatter,
-            action_change=action - self._last_action,
+            action_change=action - before.last_action,
             penalty_scale=self.penalty_scale,
         )
         bonus = earned_bonus(
@@ -124,17 +131,16 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         )
         walk = np.sum(list(terms.values()), axis=0)
         reward = with_bonus(self.config.reward, walk, bonus)
-        self._last_action = action
         self._age += 1
         info = {
             "reward_terms": terms,
             "bonus": reward - walk,
             "changed": step.changed,
             "shows_stance": agreement == 1.0,
-            "forward_speed": motion.base_linear_velocity_b[:, 0],
+            "forward_speed": truth.forward_speed,
         }
-        terminated = motion.body_contact | np.isin(self._state, self.machine.accepting)
-        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(motion)
+        terminated = truth.body_contact | np.isin(step.state, self.machine.accepting)
+        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(truth)
         truncated &= ~terminated
         observation = self._next_observation(terminated | truncated, info)
         return observation, reward, terminated, truncated, info
@@ -159,12 +165,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         n = self.num_envs
         self._rng = rng
         self._pusher = Pusher(self.config.push, n, rng)
-        self._state: Int[np.ndarray, " N"] = np.full(n, self.machine.initial)
-        self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._state = self.walker.begin(self.world.sensed)
         self._swings = Swings(self.machine, n)
-        self._touch_height: Float[np.ndarray, "N 4"] = np.zeros((n, 4))
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._commander = Commander(self.machine, self.config, n, rng)
 
     def _next_observation(self, done: Bool[np.ndarray, " N"], info: dict[str, Any]) -> Observations:
@@ -192,12 +195,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             base_velocity_w=velocity,
         )
         self._pusher.clear(ids)
-        self._state[ids] = self.machine.initial
-        self._steps_in_state[ids] = 0
+        begun = self.walker.begin(self.world.sensed.robots(ids))
+        self._state = self._state.with_robots(ids, begun)
         self._swings.restart(ids)
-        self._touch_height[ids] = last_touch(self.world.motion)[ids]
         self._age[ids] = 0
-        self._last_action[ids] = 0.0
         if start is not None:
             self._set_going(moving, start, yaw[np.isin(ids, moving)])
         self._commander.restart(ids, yaw, self.command_scale)
@@ -214,9 +215,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             return moving, None
         others = np.setdiff1d(np.arange(self.num_envs), ids)
         return moving, mix(
-            self.world.motion,
-            self._last_action,
-            self._touch_height,
+            self.world.sensed,
+            self.world.truth,
+            self._state,
             among=others,
             count=len(moving),
             rng=self._rng,
@@ -230,7 +231,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
         self.world.place(
             ids,
-            xy=self.world.motion.base_position_w[ids, :2],
+            xy=self.world.truth.base_position_w[ids, :2],
             yaw=turn,
             attitude=start.attitude,
             joint_position=start.joint_position,
@@ -238,9 +239,13 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             base_velocity_w=np.stack((c * x - s * y, s * x + c * y, z), axis=-1),
             base_angular_velocity_b=start.base_angular_velocity_b,
         )
-        self._state[ids] = self.machine.enter(start.contact)
-        self._last_action[ids] = start.last_action
-        self._touch_height[ids] = start.touch_height
+        going = GaitState(
+            machine_state=self.machine.enter(start.contact),
+            steps_in_state=np.zeros(len(ids), dtype=np.int64),
+            last_action=start.last_action,
+            touch_height=start.touch_height,
+        )
+        self._state = self._state.with_robots(ids, going)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:
@@ -251,11 +256,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         high = (max(x1 - inset, (x0 + x1) / 2), max(y1 - inset, (y0 + y1) / 2))
         return self._rng.uniform(low, high, (count, 2))
 
-    def _left_terrain(self, motion: Motion) -> Bool[np.ndarray, " N"]:
+    def _left_terrain(self, truth: Privileged) -> Bool[np.ndarray, " N"]:
         if self._is_level:
             return np.zeros(self.num_envs, dtype=bool)
         inside = self.world.terrains[0].contains
-        return ~inside(motion.base_position_w[:, :2], self.config.terrain_margin)
+        return ~inside(truth.base_position_w[:, :2], self.config.terrain_margin)
 
     @property
     def _is_level(self) -> bool:
@@ -263,21 +268,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         return all(terrain.is_flat for terrain in self.world.terrains)
 
     def _update_command(self) -> None:
-        self._commander.update(self._age, self.world.motion.yaw, self.command_scale)
+        self._commander.update(self._age, self.world.sensed.yaw, self.command_scale)
 
     def commands(self) -> dict[str, Any]:
         """What may be commanded: own value and range of forward speed and stride frequency."""
         return self._commander.ranges()
 
     def _observation(self) -> Observations:
-        return self.observe(
-            Situation(
-                machine_state=self._state,
-                steps_in_state=self._steps_in_state,
-                motion=self.world.motion,
-                command=self._commander.command,
-                last_action=self._last_action,
-                stance=self._stance,
-                touch_height=self._touch_height,
-            )
-        )
+        return self.walker.observe(self._state, self.world.sensed, self._commander.command)

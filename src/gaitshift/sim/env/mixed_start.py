@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.robot.motion import Motion
+from gaitshift.control.observation import GaitState
+from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,9 +34,9 @@ class MixedStart:
 
 
 def mix(
-    motion: Motion,
-    last_action: Float[np.ndarray, "N 12"],
-    touch_height: Float[np.ndarray, "N 4"],
+    sensed: Proprioception,
+    truth: Privileged,
+    state: GaitState,
     *,
     among: Int[np.ndarray, " M"],
     count: int,
@@ -47,9 +48,9 @@ def mix(
     whose gait was changed in the midst of a stride, whatever the gait before.
 
     Args:
-        motion: of all robots at this instant.
-        last_action: of all robots.
-        touch_height: of all robots [m].
+        sensed: what all robots sense at this instant.
+        truth: what the simulator knows of it.
+        state: where all robots are in their gait.
         among: robots that may be taken from.
         count: how many to put together.
         rng: draws whom.
@@ -60,14 +61,15 @@ def mix(
     def legs_of(joints: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "K 12"]:
         return joints.reshape(-1, 4, 3)[of_leg].reshape(count, 12)
 
+    attitude = truth.base_quaternion_w[base]
     return MixedStart(
-        joint_position=legs_of(motion.joint_position),
-        joint_velocity=legs_of(motion.joint_velocity),
-        attitude=motion.base_quaternion_w[base],
-        base_velocity_w=motion.base_linear_velocity_w[base],
-        base_angular_velocity_b=motion.base_angular_velocity_b[base],
-        yaw=motion.yaw[base],
-        last_action=legs_of(last_action),
-        touch_height=touch_height[of_leg],
-        contact=motion.contact[of_leg],
+        joint_position=legs_of(sensed.need("joint_position", "a mixed start")),
+        joint_velocity=legs_of(sensed.need("joint_velocity", "a mixed start")),
+        attitude=attitude,
+        base_velocity_w=np.einsum("kij,kj->ki", rotation_of(attitude), truth.velocity_b[base]),
+        base_angular_velocity_b=sensed.need("angular_velocity_b", "a mixed start")[base],
+        yaw=sensed.yaw[base],
+        last_action=legs_of(state.last_action),
+        touch_height=state.touch_height[of_leg],
+        contact=sensed.contact[of_leg],
     )

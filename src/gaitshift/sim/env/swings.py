@@ -4,7 +4,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from gaitshift.gait import RewardMachine, Step
-from gaitshift.robot.motion import Motion
 
 
 class Swings:
@@ -27,7 +26,12 @@ class Swings:
         self._may_land[ids] = True
 
     def see(
-        self, left: Int[np.ndarray, " N"], step: Step, motion: Motion, factor: float = 1.0
+        self,
+        left: Int[np.ndarray, " N"],
+        step: Step,
+        contact: Bool[np.ndarray, "N 4"],
+        clearance: Float[np.ndarray, "N 4"],
+        factor: float = 1.0,
     ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         """Number of touchdowns out of place, and share of the swing height that was reached.
 
@@ -38,16 +42,17 @@ class Swings:
         Args:
             left: state in which the machine was.
             step: what its step did.
-            motion: the motion after the step.
+            contact: which feet are down after the step.
+            clearance: of the feet over the ground [m].
             factor: on the machine's swing heights.
         """
-        lands = motion.contact & ~self._touches
+        lands = contact & ~self._touches
         in_place = lands & self._may_land & self._machine.expected(left)
-        height = np.fmax(self._height, motion.clearance)
+        height = np.fmax(self._height, clearance)
         lifted = self._machine.lifted(left, step.state)
-        self._touches = motion.contact.copy()
+        self._touches = contact.copy()
         self._may_land = (self._may_land & ~in_place) | lifted
-        self._height = np.where(lifted, motion.clearance, height)
+        self._height = np.where(lifted, clearance, height)
         return (lands & ~in_place).sum(axis=1), self._machine.swing_share(
             step.edge, height / factor
         )

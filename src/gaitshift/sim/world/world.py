@@ -1,4 +1,4 @@
-"""N robots stepped on all cores: joint targets in, a frozen `Motion` out."""
+"""N robots stepped on all cores: joint targets in, what they sense and the truth out."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,8 @@ from mujoco.batch import Batch
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
-from gaitshift.robot.motion import Motion, turned
+from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
+from gaitshift.sim.sensors import POSE, TWIST, sense
 from gaitshift.sim.terrain import Terrain
 from gaitshift.sim.world.scene import build_model
 
@@ -21,15 +22,12 @@ value of legged_gym."""
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are laid out before they are set down [m]; ours."""
 
-_POSE = 7  # position and quaternion in qpos
-_TWIST = 6  # linear and angular velocity in qvel
-
 
 class World:
     """N robots, each alone on its terrain.
 
     Robots do not feel each other. With several terrains, robot i stands on terrain i mod K.
-    Between calls nothing moves; `motion` is always the present one, no quantity a step late
+    Between calls nothing moves; `sensed` and `truth` are always of now, no quantity a step late
     (forces and torques are those of the last physics step, which led here).
     """
 
@@ -106,19 +104,19 @@ class World:
             base_velocity_w: [m/s].
             base_angular_velocity_b: [rad/s].
         """
-        qpos = np.zeros((len(ids), _POSE + 12))
+        qpos = np.zeros((len(ids), POSE + 12))
         qpos[:, :2] = xy
         qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
         upright = np.tile((1.0, 0.0, 0.0, 0.0), (len(ids), 1))
-        qpos[:, 3:_POSE] = turned(upright if attitude is None else attitude, yaw)
-        qpos[:, _POSE:] = self._stance if joint_position is None else joint_position
+        qpos[:, 3:POSE] = turned(upright if attitude is None else attitude, yaw)
+        qpos[:, POSE:] = self._stance if joint_position is None else joint_position
         self._batch.reset(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self._qpos[ids] = qpos
         self._qvel[ids] = 0.0
         for part, given in (
             (slice(0, 3), base_velocity_w),
-            (slice(3, _TWIST), base_angular_velocity_b),
-            (slice(_TWIST, None), joint_velocity),
+            (slice(3, TWIST), base_angular_velocity_b),
+            (slice(TWIST, None), joint_velocity),
         ):
             if given is not None:
                 self._qvel[ids, part] = given
@@ -132,8 +130,10 @@ class World:
         """Forces on the base origins, world frame [N], until the next call or `place`."""
         self._applied[:, :3] = force_w
 
-    def step(self, target: Float[np.ndarray, "N 12"]) -> Motion:
+    def step(self, target: Float[np.ndarray, "N 12"]) -> tuple[Proprioception, Privileged]:
         """One control step: joints are driven to `target` [rad], the physics moves on 10 ms.
+
+        Gives `sensed` and `truth`.
 
         Raises:
             GaitshiftError: a target is not finite; nothing has moved then.
@@ -146,31 +146,31 @@ class World:
             )
         self._ctrl[:] = target
         self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
-        self.motion = self._measure()
-        return self.motion
+        self._measure()
+        return self.sensed, self.truth
 
     def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
         """Copies of qpos and qvel, as logs and videos want them."""
         return self._qpos.copy(), self._qvel.copy()
 
-    def _measure(self) -> Motion:
+    def _measure(self) -> None:
+        """Makes `truth` and `sensed` current."""
         qpos, qvel, sensors = self._qpos, self._qvel, self._sensors
-        feet = self._feet(sensors)
-        force = sensors[:, 24:28].copy()
-        return Motion(
-            joint_position=qpos[:, _POSE:].copy(),
-            joint_velocity=qvel[:, _TWIST:].copy(),
-            joint_torque=self._torque.copy(),
+        feet, force = self._feet(sensors), sensors[:, 24:28].copy()
+        quaternion = qpos[:, 3:POSE].copy()
+        rotation = rotation_of(quaternion)
+        self.truth = Privileged(
             base_position_w=qpos[:, :3].copy(),
-            base_quaternion_w=qpos[:, 3:_POSE].copy(),
-            base_linear_velocity_w=qvel[:, :3].copy(),
-            base_angular_velocity_b=qvel[:, 3:_TWIST].copy(),
+            base_quaternion_w=quaternion,
+            velocity_b=np.einsum("nij,ni->nj", rotation, qvel[:, :3]),
             foot_position_w=feet,
             foot_velocity_w=sensors[:, 12:24].reshape(-1, 4, 3).copy(),
             foot_force=force,
-            contact=force > CONTACT_FORCE,
             clearance=feet[..., 2] - self._ground(feet[..., :2], None),
             body_contact=sensors[:, 28] > 0.0,
+        )
+        self.sensed = sense(
+            self.truth, rotation, qpos, qvel, self._torque, contact=force > CONTACT_FORCE
         )
 
     def _feet(self, sensors: Float[np.ndarray, "K S"]) -> Float[np.ndarray, "K 4 3"]:
@@ -193,17 +193,17 @@ class World:
 
     def _settle(self, ids: Int[np.ndarray, " K"]) -> None:
         """Makes every measured quantity of these robots current."""
-        self._ctrl[ids] = self._qpos[ids, _POSE:]
+        self._ctrl[ids] = self._qpos[ids, POSE:]
         self._applied[ids] = 0.0
         self._batch.forward(ids=ids)
-        self.motion = self._measure()
+        self._measure()
 
     def _kept_state(
         self, terrains: tuple[Terrain, ...]
     ) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
         """The present state, lifted or lowered so that no foot stands deeper than before."""
         qpos, qvel = self.state()
-        feet = self.motion.foot_position_w[..., :2]
+        feet = self.truth.foot_position_w[..., :2]
         before = self._ground(feet, None)
         self.terrains = terrains[: self.n]
         qpos[:, 2] += (self._ground(feet, None) - before).max(axis=1)

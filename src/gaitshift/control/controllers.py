@@ -1,0 +1,36 @@
+"""Controllers by their names on the command line: one file each, and a line here."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from gaitshift.control.controller import Controller
+from gaitshift.control.cpg import CpgController
+from gaitshift.control.driver import Driver
+from gaitshift.data import known_names
+from gaitshift.errors import GaitshiftError
+
+
+class ControllerMaker(Protocol):
+    """Makes a controller of n robots, all in the first of the gaits."""
+
+    def __call__(self, gaits: Sequence[str], n: int) -> Controller:
+        """`gaits` are names, or whatever files the controller reads."""
+        ...
+
+
+CONTROLLERS: dict[str, ControllerMaker] = {
+    "policy": Driver.load,
+    "cpg": CpgController,
+}
+"""Trained policies; oscillators that learned nothing."""
+
+
+def controller_maker(name: str) -> ControllerMaker:
+    """The maker of this name.
+
+    Raises:
+        GaitshiftError: there is none.
+    """
+    if name not in CONTROLLERS:
+        raise GaitshiftError(known_names("controller", name, tuple(CONTROLLERS)))
+    return CONTROLLERS[name]
