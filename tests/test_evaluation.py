@@ -259,7 +259,7 @@ def test_a_damaged_or_foreign_log_is_named(tmp_path) -> None:
     with pytest.raises(GaitshiftError, match="no log file"):
         Log.load(path)
     path.write_bytes(b"PK\x03\x04 not really")
-    with pytest.raises(GaitshiftError, match=r"log\.npz is not a whole npz file"):
+    with pytest.raises(GaitshiftError, match=r"log\.npz is not a complete npz file"):
         Log.load(path)
     np.savez(path, time=np.zeros(3))
     with pytest.raises(GaitshiftError, match="lacks 'qpos'"):

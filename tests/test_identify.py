@@ -405,7 +405,11 @@ def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [([], "trot"), (["trot", "--courses", "moon"], "no course 'moon'"), (["moon"], "no policy")],
+    [
+        ([], "trot"),
+        (["trot", "--courses", "moon"], "no course 'moon'"),
+        (["moon"], "policy must be one of"),
+    ],
 )
 def test_bad_input_of_record_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
     with pytest.raises(SystemExit) as end:

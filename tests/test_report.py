@@ -160,7 +160,7 @@ def test_report_writes_a_page_beside_the_log_and_replaces_none_unasked(log, tmp_
         (["{log}", "--robot", "7"], "robot 7 is not in the log"),
         (["{log}", "--video", "no.mp4"], "no video no.mp4"),
         (["{log}", "--out", "no/where.html"], "no folder no"),
-        (["README.md"], "not a whole npz file"),
+        (["README.md"], "not a complete npz file"),
     ],
 )
 def test_bad_input_of_report_is_one_line_and_code_2(log, tmp_path, capsys, arguments, message):

@@ -436,7 +436,7 @@ def test_a_run_that_breaks_down_in_its_numbers_is_a_finding(part, tmp_path, monk
     train(job, tmp_path / job.name)
     assert is_over(job, tmp_path / job.name)
     text = (tmp_path / job.name / FAILED).read_text()
-    assert text.startswith("the training broke down: ")
+    assert text.startswith("training diverged: ")
     assert text.count("\n") == 1
     results = Results.read(Plan.tiny(), tmp_path)
     assert results.seeds["multiply", "trot"].broken == (True,)
@@ -449,11 +449,13 @@ def test_weights_that_are_no_numbers_are_told_before_anybody_acts_on_them(tmp_pa
     run = Run.create(tmp_path / "run", job.machine, job.recipe, seed=0, command="test")
     with torch.no_grad():
         run.learner.ppo.actor.mlp[0].weight[3, 1] = torch.nan
-    with pytest.raises(DivergedError, match="broke down: an action is not a number"):
+    with pytest.raises(DivergedError, match="training diverged: an action is not a number"):
         run.iterate()
     with torch.no_grad():
         run.learner.ppo.actor.distribution.std_param[2] = torch.nan
-    with pytest.raises(DivergedError, match=r"broke down: distribution\.std_param of the actor"):
+    with pytest.raises(
+        DivergedError, match=r"training diverged: distribution\.std_param of the actor"
+    ):
         run.iterate()
 
 

@@ -175,7 +175,7 @@ def test_a_table_that_is_none_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(["transitions", "trot", "pace", "--out", str(tmp_path)])
     assert end.value.code == 2
-    assert "is no table of shifts" in capsys.readouterr().err
+    assert "is not a table of shifts" in capsys.readouterr().err
 
 
 def test_the_map_shades_failures_and_counts_them(tmp_path):

@@ -23,7 +23,7 @@ def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
     """Say in one line what is unknown, what may have been meant and what is known."""
     close = get_close_matches(name, known, n=1)
     meant = f" did you mean {close[0]!r}?" if close else ""
-    return f"unknown {kind} {name!r};{meant} {kind}s are {', '.join(known)}"
+    return f"unknown {kind} {name!r};{meant} known {kind}s: {', '.join(known)}"
 
 
 class Table:
@@ -35,7 +35,7 @@ class Table:
 
     def __init__(self, data: object, *, keys: tuple[str, ...]):
         if not isinstance(data, dict):
-            raise GaitshiftError(f"must be a table of keys and values, not {shortened(data)}")
+            raise GaitshiftError(f"must be a table of keys and values, got {shortened(data)}")
         self._values = cast(dict[str, object], data)
         for key in self._values:
             if key not in keys:
@@ -80,7 +80,7 @@ class Table:
         try:
             return float(value)
         except OverflowError:
-            raise _wrong(key, "a number of a usual size", value) from None
+            raise _wrong(key, "a number of at most 1e308", value) from None
 
     def pair(self, key: str, *, default: tuple[float, float]) -> tuple[float, float]:
         """Return two numbers, the lower and the upper end of a range."""
@@ -105,7 +105,7 @@ class Table:
             if not isinstance(name, str):
                 raise _wrong(key, 'a list of feet, such as ["FL", "BR"]', names)
             if names.count(name) > 1:
-                raise GaitshiftError(f"{key!r} names {name} twice")
+                raise GaitshiftError(f"{key!r} must name each foot once, got {name} twice")
         return frozenset(cast(list[str], names))
 
     def table(self, key: str) -> dict[str, object]:
@@ -136,7 +136,7 @@ class Table:
         try:
             return [float(value) for value in cast(list[float], values)]
         except OverflowError:
-            raise _wrong(key, "two numbers of a usual size", values) from None
+            raise _wrong(key, "numbers of at most 1e308", values) from None
 
     def _list(self, key: str, wanted: str) -> list[object]:
         value = self.get(key)
@@ -146,4 +146,4 @@ class Table:
 
 
 def _wrong(key: str, wanted: str, value: object) -> GaitshiftError:
-    return GaitshiftError(f"{key!r} must be {wanted}, not {shortened(value)}")
+    return GaitshiftError(f"{key!r} must be {wanted}, got {shortened(value)}")

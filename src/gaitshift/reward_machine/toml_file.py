@@ -23,15 +23,17 @@ def tables_in(path: Path) -> dict[str, object]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise GaitshiftError("there is no such file") from None
+        raise GaitshiftError("no such file") from None
     except OSError as error:
         raise GaitshiftError(f"the file cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise GaitshiftError("this is not a TOML file: it is not UTF-8 text") from None
+        raise GaitshiftError(
+            "the file must be TOML in UTF-8, got bytes that are not UTF-8"
+        ) from None
     try:
         tables = tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        raise GaitshiftError(f"this is not a TOML file: {error}") from None
+        raise GaitshiftError(f"the file is not valid TOML: {error}") from None
     if not tables:
         raise GaitshiftError("the file is empty")
     return tables
