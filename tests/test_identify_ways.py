@@ -182,10 +182,10 @@ def test_the_headroom_of_the_way_back_lies_at_a_larger_alpha():
 
 def test_the_words_for_ground_that_is_missing_are_those_of_the_way_back():
     made = Tally(shape=GRID.shape)
-    with pytest.raises(GaitshiftError, match="no rough ground that ends in the recordings"):
+    with pytest.raises(GaitshiftError, match="must contain rough ground that ends to detect"):
         choose({0.0: {"walk": made}}, GRID, "below")
     made.came[:] = 1
-    with pytest.raises(GaitshiftError, match="no rough ground in the recordings: nothing to keep"):
+    with pytest.raises(GaitshiftError, match="must contain rough ground to count false shifts on"):
         choose({0.0: {"walk": made}}, GRID, "below")
 
 
@@ -400,7 +400,7 @@ def test_a_condition_named_twice_is_judged_once(tmp_path, capsys, log):
 
 def test_no_recordings_at_all_are_refused():
     given = as_given(only("paper"), way="rough", alpha=0.1, beta=9.0)
-    with pytest.raises(GaitshiftError, match="no recordings to judge by"):
+    with pytest.raises(GaitshiftError, match="must be recordings to judge by"):
         judged_by(given, [])
 
 

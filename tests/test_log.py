@@ -138,4 +138,7 @@ def test_a_log_without_a_touch_is_shown_but_not_identified_by(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(["identify", str(path), "--out", str(tmp_path / "report")])
     assert end.value.code == 2
-    assert f"{path}: no foot ever touches" in capsys.readouterr().err.splitlines()[-1]
+    assert (
+        f"{path}: 'contact' must be true where a foot is down"
+        in capsys.readouterr().err.splitlines()[-1]
+    )

@@ -69,5 +69,5 @@ def test_two_policies_of_one_gait_are_refused(tmp_path, capsys):
 
 
 def test_a_length_that_is_none_is_refused_before_anything_is_recorded(tmp_path, capsys):
-    assert "more than 0, up to 3600" in refused(capsys, ask(tmp_path / "logs", 2, "nan"))
+    assert "above 0 and at most 3600" in refused(capsys, ask(tmp_path / "logs", 2, "nan"))
     assert not (tmp_path / "logs").exists()

@@ -108,7 +108,7 @@ def test_a_plan_is_all_settings_gaits_and_seeds_and_parts_can_be_picked():
         *(f"paper-gains-trot-{s}" for s in (4, 5, 6)),
     ]
     assert plan.select(("bonus",)) == plan.select(("multiply", "multiply-clipped"))
-    with pytest.raises(GaitshiftError, match="nothing called 'canter'; known: paper, trot"):
+    with pytest.raises(GaitshiftError, match=r"paper, trot.*got 'canter'"):
         plan.select(("canter",))
 
 
@@ -325,7 +325,7 @@ def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
     ("name", "old", "new", "says"),
     [
         ("runs.csv", "setting,", "set,", "runs.csv is damaged: 'setting'"),
-        ("curves.csv", "blind,trot,0,7,", "blind,trot,9,7,", "200 lines of blind-trot-0"),
+        ("curves.csv", "blind,trot,0,7,", "blind,trot,9,7,", "must have 200 lines of blind-trot-0"),
         ("curves.csv", "26.00", "2_6.0?", "curves.csv is damaged: could not convert"),
     ],
 )
@@ -549,12 +549,12 @@ def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--only", "canter"], "nothing called 'canter'"),
-        (["--jobs", "0"], "jobs = 0: 1 to 1024"),
-        (["--seed", "-1"], "seed -1"),
-        (["--out", "file"], "file is a file"),
-        (["--out", "file/x/y"], "file is a file"),
-        (["--runs", "file/x"], "file is a file"),
+        (["--only", "canter"], "got 'canter'"),
+        (["--jobs", "0"], "jobs must be 1 to 1024, got 0"),
+        (["--seed", "-1"], "seed must be 0 or larger, got -1"),
+        (["--out", "file"], "must be a folder, got the file file"),
+        (["--out", "file/x/y"], "must be a folder, got the file file"),
+        (["--runs", "file/x"], "must be a folder, got the file file"),
     ],
 )
 def test_a_fault_of_the_user_is_one_line(arguments, says, tmp_path, monkeypatch, capsys):

@@ -53,13 +53,13 @@ class Reproduce:
                 f"training needs the package '{error.name}'; install gaitshift[train]"
             ) from error
         if not 1 <= self.jobs <= 1024:
-            raise GaitshiftError(f"jobs = {self.jobs}: 1 to 1024 would be right")
+            raise GaitshiftError(f"jobs must be 1 to 1024, got {self.jobs}")
         runs = self.runs or (QUICK_RUNS if self.quick else RUNS)
         out = self.out or (QUICK_RESULTS if self.quick else RESULTS)
         for folder in (runs, out):
             there = next(path for path in (folder, *folder.parents) if path.exists())
             if not there.is_dir():
-                raise GaitshiftError(f"{there} is a file; a folder would be right")
+                raise GaitshiftError(f"--out and --runs must be a folder, got the file {there}")
         plan = Plan.tiny(self.seed) if self.quick else Plan(seed=self.seed)
         told = Told.read(plan, out) if self.add else Told()
         wanted = [job for job in plan.select(self.only) if job.name not in told.courses]

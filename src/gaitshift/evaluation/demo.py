@@ -82,26 +82,26 @@ class DemoConfig:
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 1000:
-            raise GaitshiftError(f"{self.episodes} episodes: 1 to 1000 would be right")
+            raise GaitshiftError(f"episodes must be 1 to 1000, got {self.episodes}")
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if not 0.2 <= self.every <= 60:
-            raise GaitshiftError(f"a gait every {self.every} s: 0.2 to 60 s would be right")
+            raise GaitshiftError(f"every must be 0.2 to 60 s, got {self.every}")
         given = [name for name in _NUMBERS if getattr(self, name) is not None]
         if self.graph and given:
             raise GaitshiftError(
-                f"a graph has its own numbers: change {given[0]} in its file, or leave --graph out"
+                f"{given[0]} must not be given with a graph; change it in the graph's file"
             )
         if len(self.gaits) == 1:
-            raise GaitshiftError("one gait alone has nothing to shift to; give two or more")
+            raise GaitshiftError(f"gaits must name two gaits or more, got {self.gaits[0]} alone")
 
         if self.at and len(self.at) != len(self.gaits) - 1:
             raise GaitshiftError(
-                f"{len(self.at)} times for {len(self.gaits)} gaits: {len(self.gaits) - 1} "
-                "would be right, one for each shift"
+                f"at must give {max(0, len(self.gaits) - 1)} times for {len(self.gaits)} gaits, "
+                f"one for each shift, got {len(self.at)}"
             )
         if any(late <= early for early, late in pairwise((0.0, *self.at))):
-            raise GaitshiftError("the times of the shifts must be positive and rising")
+            raise GaitshiftError(f"at must give rising times above 0 s, got {list(self.at)}")
 
     @property
     def shift_times(self) -> tuple[float, ...]:

@@ -58,16 +58,18 @@ class EvaluationConfig:
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 100_000:
-            raise GaitshiftError(f"{self.episodes} episodes: 1 to 100000 would be right")
+            raise GaitshiftError(f"episodes must be 1 to 100000, got {self.episodes}")
         if not 0 < self.seconds <= 3600:
-            raise GaitshiftError(f"{self.seconds} seconds: more than 0, up to 3600 would be right")
+            raise GaitshiftError(f"seconds must be above 0 and at most 3600, got {self.seconds}")
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if self.speed is not None and not 0 <= self.speed <= MOST_SPEED:
-            raise GaitshiftError(f"{self.speed} m/s: 0 to {MOST_SPEED:g} m/s would be right")
+            raise GaitshiftError(f"speed must be 0 to {MOST_SPEED:g} m/s, got {self.speed}")
         frequency, most = self.stride_frequency, 1 / CONTROL_PERIOD
         if frequency is not None and not 0 < frequency <= most:
-            raise GaitshiftError(f"{frequency} Hz: more than 0, up to {most:g} Hz would be right")
+            raise GaitshiftError(
+                f"stride_frequency must be above 0 and at most {most:g} Hz, got {frequency}"
+            )
 
 
 def evaluate(
@@ -183,7 +185,7 @@ def _check_length(ground: Terrain, spec: str, *, speed: float, seconds: float) -
     needed = RUN_UP + asked + max(MARGIN * asked, LEAST_MARGIN)
     if not ground.is_flat and ground.size[0] < needed - 1e-6:
         raise GaitshiftError(
-            f"terrain {spec!r} is {ground.size[0]:g} m long, too short for {seconds:g} s at "
-            f"{speed:g} m/s: {ceil(needed)} m or more would be right ({RUN_UP:g} m of them behind "
-            "the start), or fewer seconds"
+            f"terrain {spec!r}: length must be {ceil(needed)} m or more for {seconds:g} s at "
+            f"{speed:g} m/s, {RUN_UP:g} m of it behind the start, got {ground.size[0]:g} m; give a "
+            "longer terrain or fewer seconds"
         )
