@@ -180,9 +180,9 @@ def test_oscillators_are_judged_as_policies_are(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["trot", "--trials", "quick"], "--trials is for policies"),
-        (["trot", "--commands"], "--commands is for policies"),
-        (["trot", "--robot-file", "pony.toml"], "no --robot-file"),
+        (["trot", "--trials", "quick"], "--trials must not be given with --controller cpg"),
+        (["trot", "--commands"], "--commands must not be given with --controller cpg"),
+        (["trot", "--robot-file", "pony.toml"], "--robot-file must not be given"),
         (["gallop", "--log", "{folder}/new/log.npz"], "got 'gallop'"),
     ],
 )

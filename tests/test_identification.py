@@ -190,7 +190,7 @@ def test_the_pieces_of_a_track_are_found_again_by_its_name():
 
 
 def test_a_name_that_is_none_is_refused():
-    with pytest.raises(GaitshiftError, match="'far' is no length in metres"):
+    with pytest.raises(GaitshiftError, match="length must be a number of metres, got 'far'"):
         sections_of("flat@far", 0.0, 1.0)
 
 

@@ -34,7 +34,7 @@ def read_robot(path: Path) -> Robot:
     """The robot in a TOML file, with its model checked.
 
     Raises:
-        GaitshiftError: one line that begins with the file's path, and says what would be right.
+        GaitshiftError: one line that begins with the file's path.
     """
     with located(str(path)):
         table = Table(tables_in(path), keys=_KEYS)

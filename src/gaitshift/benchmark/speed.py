@@ -25,9 +25,9 @@ class SpeedConfig:
     robots: int = 128
     """Robots in parallel."""
     steps: int = 100
-    """Control steps a round."""
+    """Control steps per round."""
     terrain: str = "flat"
-    """Ground, as in `evaluate`."""
+    """Terrain, as in `evaluate`."""
     seed: int = 0
     """Seed of the actions."""
 

@@ -38,23 +38,23 @@ class EvaluationConfig:
     """What a policy is put through."""
 
     terrain: str = "flat"
-    """Spec of the ground: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a
-    track."""
+    """Terrain: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a track of
+    pieces with lengths, such as flat@8,perlin:0.10@12."""
     episodes: int = 256
-    """Robots, each running one episode, all at once."""
+    """Number of robots; each runs one episode."""
     seconds: float = 10.0
     """Length of an episode [s]."""
     speed: float | None = None
-    """Commanded forward speed [m/s]; the gait's own by default."""
+    """Commanded forward speed [m/s]; by default the gait's nominal speed."""
     stride_frequency: float | None = None
-    """Commanded stride frequency [Hz]; the gait's own by default."""
+    """Commanded stride frequency [Hz]; by default the gait's nominal frequency."""
     open_loop: bool = False
-    """Ask the policy for the speed as it is; by default a slow loop trims what is asked for, so
-    that the mean speed is the commanded one."""
+    """Give the policy the commanded speed directly; by default a slow speed loop adjusts it so that
+    the mean speed equals the commanded speed."""
     push: float = 0.0
-    """Largest push on the base, 0.2 s long, every 2 s [N]."""
+    """Largest push on the base [N]; a push lasts 0.2 s and comes every 2 s."""
     seed: int = 0
-    """Seed of grounds, starting noise and pushes."""
+    """Seed of terrains, starts and pushes."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 100_000:

@@ -112,8 +112,8 @@ def _introduction(results: Results) -> str:
             f"A run *walks* from the first of {HELD_FOR} successive iterations with a mean speed "
             f"above {WALKING_SPEED:g} m/s and more than {WALKING_CHANGES:g} changes of the "
             "machine's state per second. *At the end* is the last tenth of the iterations. "
-            f"Training figures include exploration noise. Curves dip every {recipe.checkpoint_every} iterations, "
-            "because all robots start again at a checkpoint.",
+            "Training figures include exploration noise. Curves dip every "
+            f"{recipe.checkpoint_every} iterations, as all robots start again at a checkpoint.",
         )
     )
 

@@ -140,7 +140,7 @@ def from_spec(
     The same spec, seed and sizes give the same bits. In a track each piece draws from its own
     stream of the seed, so that changing one piece leaves the noise of the others.
 
-    `GaitshiftError`, one line that names the faulty piece and what would be right.
+    `GaitshiftError`, one line that names the faulty piece and what is allowed.
     """
     if seed < 0:
         raise GaitshiftError(f"terrain {spec!r}: seed must be 0 or larger, got {seed}")
