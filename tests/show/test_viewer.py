@@ -166,7 +166,7 @@ def test_what_was_recorded_is_a_log_of_what_was_seen(policies, tmp_path):
         ({"robots": 17}, "1 to 16"),
         ({"seed": -1}, "0 or larger"),
         ({"track": "moon@3"}, "moon"),
-        ({"rough_gait": "walk"}, "no policy for the gait 'walk'"),
+        ({"rough_gait": "walk"}, "got 'walk'"),
     ],
 )
 def test_what_cannot_be_had_is_refused_and_all_stays_as_it_was(policies, change, message):
@@ -255,7 +255,7 @@ def test_the_chart_of_heights_is_silent_of_feet_that_have_not_touched(policies):
         (["--condition", "guess"], "unknown condition 'guess'"),
         (["--port", "70000"], "1 to 65535"),
         (["--track", "moon@3"], "moon"),
-        (["--host", "203.0.113.7"], "203.0.113.7:8080 cannot be had"),
+        (["--host", "203.0.113.7"], "cannot listen on 203.0.113.7:8080"),
     ],
 )
 def test_bad_input_of_view_is_one_line_and_code_2(capsys, arguments, message):
@@ -273,7 +273,7 @@ def test_a_port_that_is_taken_is_named(capsys):
         with pytest.raises(SystemExit) as end:
             main(["view", "--port", str(port)])
     assert end.value.code == 2
-    assert f"127.0.0.1:{port} cannot be had" in capsys.readouterr().err
+    assert f"cannot listen on 127.0.0.1:{port}" in capsys.readouterr().err
 
 
 # In a browser -------------------------------------------------------------------------------------
