@@ -308,9 +308,12 @@ def served(tmp_path):
         process.communicate()
 
 
-def opened(browser, address):
-    """A page on the address, and what went wrong on it."""
-    page, wrong = browsing.opened(browser, address)
+def opened(browser, address, *, fine=False):
+    """A page on the address, and what went wrong on it.
+
+    To draw in software takes most of a page's time, so that those are coarse that nobody looks at.
+    """
+    page, wrong = browsing.opened(browser, address, device_scale_factor=1.0 if fine else 0.25)
     wait_for_status(page)
     return page, wrong
 
@@ -399,7 +402,7 @@ def gait_is(page, gait):
 def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(served, browser):
     """No feet differ by 0.3 m on this ground, and nearly all steps differ by 5 mm."""
     _, address = served("--track", "perlin:0.1@300")
-    page, wrong = opened(browser, address)
+    page, wrong = opened(browser, address, fine=True)
     enter(page, "α [m]", 0.3)
     enter(page, "α' [m]", 0.3)
     wait_until(gait_is(page, "trot"))
@@ -420,7 +423,7 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
 @browsing.needed
 def test_the_clock_and_the_ground_are_in_the_hands_of_whoever_looks(served, browser):
     _, address = served("--track", "flat@200")
-    page, wrong = opened(browser, address)
+    page, wrong = opened(browser, address, fine=True)
     wait_until(lambda: status(page)[2] > 3.0)
     pause(page)
     stopped = status(page)[2]
@@ -550,7 +553,7 @@ def test_a_log_plays_in_the_browser_and_its_slider_is_obeyed(served, browser, po
     walk(run, 6.0)
     run.end_recording().save(tmp_path / "log.npz")
     _, address = served(str(tmp_path / "log.npz"))
-    page, wrong = opened(browser, address)
+    page, wrong = opened(browser, address, fine=True)
     wait_until(lambda: 0.5 < shown_time(page) < 5.0)
     page.get_by_role("button", name="pause", exact=True).click()
     page.get_by_role("button", name="play", exact=True).wait_for()
