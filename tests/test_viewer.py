@@ -84,6 +84,7 @@ def test_a_live_robot_does_what_the_demonstrations_robot_does(policies):
     np.testing.assert_allclose([f.k[0] for f in frames], log.k[: len(frames), 0])
 
 
+@pytest.mark.learned
 def test_alpha_acts_at_once_and_the_count_goes_on_from_where_it_was(policies):
     run = LiveRun(LiveConfig(track="perlin:0.12@20"), policies)
     before = next(frame for frame in iter(run.step, None) if frame.k[0] > 20)
@@ -106,6 +107,7 @@ def test_robots_that_are_not_to_shift_do_not_and_take_the_gait_they_are_given(po
     assert run.step().gait.tolist() == [run.gaits.index("pace")] * 3
 
 
+@pytest.mark.learned
 def test_a_push_moves_the_robot_its_way_and_no_further_than_a_free_body_of_its_mass(policies):
     """90 N for 0.2 s on 30.5 kg, then 0.1 s more: a t² / 2 + a t · 0.1 s = 0.118 m in flight."""
     config = LiveConfig(track="flat@30", is_autonomous=False)
@@ -134,6 +136,7 @@ def test_a_run_is_over_at_the_end_of_the_track_or_after_a_fall(policies):
     assert frames[-1].time == pytest.approx(fell + 2.0, abs=0.03)
 
 
+@pytest.mark.learned
 def test_another_speed_is_walked_without_beginning_anew(policies):
     run = LiveRun(LiveConfig(track="flat@30", is_autonomous=False), policies)
     walk(run, 2.0)
