@@ -5,7 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
-PYTEST_ARGS ?= -n 2
+PYTEST_ARGS ?= -n 2 --dist worksteal
 GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
 
@@ -17,15 +17,18 @@ STUBS := typings/.made
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test check bench policies docs lock player clean
+.PHONY: help demo test test-all check bench policies docs lock player clean
 
 help: ## list what can be made
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(BASE) ## a robot shifts its gait by itself: out/demo (a light install, without torch)
 	@$(BIN)/gaitshift demo --out out/demo --overwrite
 
-test: $(DEV) ## run the tests; PYTEST_ARGS="-k switching" for some of them
+test: $(DEV) ## run the tests but for the slow ones; PYTEST_ARGS="-k switching" for some of them
+	@$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGS)
+
+test-all: $(DEV) ## run the slow tests as well: trainings, pages in a browser, the documentation
 	@$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 check: $(DEV) $(STUBS) ## lint, format, types and floors

@@ -270,7 +270,8 @@ main(sys.argv[1:])
 def test_ctrl_c_leaves_a_run_that_goes_on(tmp_path: Path) -> None:
     """Interrupted in a training: exit code 130, no traceback, and --resume ends it."""
     out = tmp_path / "run"
-    arguments = ["train", "trot", "--robots", "8", "--iterations", "40", "--out", str(out)]
+    size = ["--robots", "8", "--iterations", "40", "--threads", "1"]
+    arguments = ["train", "trot", *size, "--out", str(out)]
     done = subprocess.run(
         [sys.executable, "-c", INTERRUPTED, *arguments], capture_output=True, text=True, check=False
     )

