@@ -8,6 +8,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?= -n 2
 GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
+# What the wheel is tried with: tests that need neither torch nor a browser.
+WHEEL_TESTS := tests/test_reward_machine.py tests/test_gaits.py tests/test_terrain.py \
+    tests/test_height_difference.py tests/test_conditions.py tests/test_robot.py
 
 # Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.
 BASE := $(VENV)/.base-installed
@@ -17,7 +20,7 @@ STUBS := typings/.made
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test check bench policies docs lock player clean
+.PHONY: help demo test check wheel bench policies docs lock player clean
 
 help: ## list what can be made
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -33,6 +36,9 @@ check: $(DEV) $(STUBS) ## lint, format, types and floors
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/basedpyright
 	@$(BIN)/lint-imports --no-logo
+
+wheel: $(DEV) ## build wheel and sdist, try the wheel on Python 3.11 to 3.13 and with old packages
+	@$(BIN)/python tools/check_wheel.py $(WHEEL_TESTS)
 
 bench: $(DEV) ## speed of the environment and of training on this machine
 	@$(BIN)/gaitshift bench
