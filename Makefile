@@ -9,9 +9,9 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?= -n 2
 GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
-# What the wheel is tried with: tests that need neither torch nor a browser.
+# What the wheel is tried with: quick tests that need neither torch nor a browser.
 WHEEL_TESTS := tests/test_reward_machine.py tests/test_gaits.py tests/test_terrain.py \
-    tests/test_height_difference.py tests/test_conditions.py tests/test_robot.py
+    tests/test_height_difference.py tests/test_robot.py
 # What the newest versions are tried with, without torch: these, and pictures and physics.
 NEWEST_TESTS := $(WHEEL_TESTS) tests/test_plots.py tests/test_geometry.py tests/test_world.py
 
