@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from gaitshift.cli import main
+from pages import links
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "docs" / "index.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
@@ -71,3 +72,17 @@ def test_pages_on_shifting_are_made_by_the_commands_that_stand_on_them():
     for page, command in (made | names["STUDIED"]).items():
         text = (ROOT / "docs" / "results" / "shifting" / page / "README.md").read_text("utf-8")
         assert f"Made by `gaitshift {' '.join(command)} --out " in text, page
+
+
+@pytest.mark.parametrize(
+    "page",
+    [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))],
+    ids=lambda page: page.relative_to(ROOT).as_posix(),
+)
+def test_every_file_that_a_page_links_to_is_there(page):
+    assert {link for link in links(page) if not (page.parent / link).exists()} == set()
+
+
+def test_the_page_of_the_gaits_is_what_the_records_beside_the_policies_say():
+    names = runpy.run_path(str(ROOT / "tools" / "gait_results.py"))
+    assert names["PAGE"].read_text(encoding="utf-8") == names["page"]()
