@@ -1,4 +1,4 @@
-"""What a Markdown page holds: its links, tables and names in backticks, by a parser."""
+"""What a Markdown page holds: its links, tables, lists and code, by a parser."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +26,11 @@ def links(page: Path) -> set[str]:
 def codes(page: Path) -> list[str]:
     """The texts in backticks, in their order."""
     return [token.content for token in tokens(page) if token.type == "code_inline"]
+
+
+def fences(page: Path) -> list[tuple[str, str]]:
+    """The blocks of code, in their order: what follows the fence, and the text."""
+    return [(token.info, token.content) for token in tokens(page) if token.type == "fence"]
 
 
 def rows(page: Path) -> list[list[list[Token]]]:

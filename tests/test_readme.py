@@ -1,12 +1,11 @@
 """The README: its code is run, it lists every command, and it is short."""
 
-import re
 from pathlib import Path
 
 import pytest
 
 from gaitshift.cli import main
-from pages import items, rows
+from pages import fences, items, rows
 
 ROOT = Path(__file__).parent.parent
 README, DESIGN = ROOT / "README.md", ROOT / "docs" / "design.md"
@@ -16,7 +15,7 @@ LONGEST = 1200
 
 
 def test_the_readmes_code_runs_and_its_condition_counts_nothing_on_level_feet():
-    (block,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    (block,) = (text for kind, text in fences(README) if kind == "python")
     names = {}
     exec(block, names)
     assert names["state"].k.tolist() == [0.0]

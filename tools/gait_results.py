@@ -33,9 +33,9 @@ Flat ground, {episodes} robots for {seconds:g} s, no exploration, the gait's nom
 frequency, the first 2 s left out. `gaitshift.gait_analysis` defines the figures. This page is made
 by `tools/gait_results.py` from the records beside the policies.
 
-- *Clean*: the contacts are those of the gait, and every limit is kept (`gait_analysis/limits.py`,
-  `evaluation/trials.py`). Trot, pace and bound have stricter limits than the others. The others
-  have none on noise of 0.15 m and more, slopes, stairs and steps.
+- *Clean*: the contacts are those of the gait, and every limit is kept. Trot, pace and bound have
+  stricter limits than the others (`src/gaitshift/gait_analysis/limits.py`). The others have none on
+  noise of 0.15 m and more, slopes, stairs and steps (`src/gaitshift/evaluation/trials.py`).
 - *Cycles*: rounds of the machine a second.
 - *Pattern*: the share of control steps whose contacts are a stance of the gait.
 - *Touchdowns*: onsets of contact over those that the machine asks for in a cycle; 1 without
