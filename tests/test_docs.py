@@ -1,5 +1,6 @@
 """The documentation: every block of code and every command in it is run, and the site is built."""
 
+import json
 import runpy
 import shlex
 import shutil
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from gaitshift.cli import main
-from pages import codes, fences, links
+from pages import codes, fences, links, rows
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "docs" / "index.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
@@ -87,3 +88,17 @@ def test_every_file_that_a_page_links_to_is_there(page):
 def test_the_page_of_the_gaits_is_what_the_records_beside_the_policies_say():
     names = runpy.run_path(str(ROOT / "tools" / "gait_results.py"))
     assert names["PAGE"].read_text(encoding="utf-8") == names["page"]()
+
+
+def test_the_page_of_stairs_and_steps_has_the_figures_of_the_records():
+    names = runpy.run_path(str(ROOT / "tools" / "gait_results.py"))
+    for cells in rows(ROOT / "docs" / "results" / "edges.md"):
+        gait, *told = ("".join(token.content for token in cell) for cell in cells)
+        record = json.loads((names["POLICIES"] / f"{gait.replace('-', '_')}.json").read_text())
+        trials = {row["trial"]: row["value"] for row in record["evaluation"]["trials"]}
+        measured = [
+            trials[f"{figure} of 20 s, {ground}"]
+            for ground in ("stairs:0.05", "step:0.10")
+            for figure in ("survival", "distance_share")
+        ]
+        assert [float(text) for text in told] == pytest.approx(measured, abs=0.00051), gait
