@@ -12,9 +12,9 @@ README = "README.md"
 def check_numbers(what: str, count: int, seed: int, *, least: int = 1) -> None:
     """`GaitshiftError` unless there are so many, and the seed is one."""
     if not least <= count <= 1_000_000:
-        raise GaitshiftError(f"{count} {what}: {least} to 1000000 would be right")
+        raise GaitshiftError(f"{what} must be {least} to 1000000, got {count}")
     if seed < 0:
-        raise GaitshiftError(f"seed {seed}: a seed is 0 or larger")
+        raise GaitshiftError(f"seed must be 0 or larger, got {seed}")
 
 
 def kept_rows(
@@ -33,8 +33,8 @@ def kept_rows(
         for name, wanted in (alike or {}).items():
             if row[name] != wanted:
                 raise GaitshiftError(
-                    f"{path} has {what} with {name} = {row[name]}, not {wanted}: give that, "
-                    "another --out, or --overwrite to begin anew"
+                    f"{name} must be {row[name]} to add to {path}, got {wanted}; give that, "
+                    "another --out, or --overwrite to discard it"
                 )
     path.parent.mkdir(parents=True, exist_ok=True)
     return rows

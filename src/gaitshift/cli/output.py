@@ -67,7 +67,7 @@ def check_folder(
     was killed has `left` there is no content.
     """
     if folder.exists() and not folder.is_dir():
-        raise GaitshiftError(f"{folder} is a file; give a folder with --out")
+        raise GaitshiftError(f"--out must be a folder, got the file {folder}")
     if overwrite or not folder.is_dir():
         return
     if any(path.name != left for path in folder.iterdir()):

@@ -152,7 +152,7 @@ def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
         with path.open("rb") as file:
             entries = np.load(file)
             if not isinstance(entries, np.lib.npyio.NpzFile):
-                raise ValueError("it holds one array alone")
+                raise ValueError("it holds a single array")
             version = int(entries["format_version"]) if "format_version" in entries else None
             if version is None and "qpos" in entries:
                 raise GaitshiftError(
@@ -168,10 +168,10 @@ def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
     except FileNotFoundError as error:
         raise GaitshiftError(f"no log file {path}") from error
     except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        raise GaitshiftError(f"{path} is not a whole npz file: {error}") from error
+        raise GaitshiftError(f"{path} is not a complete npz file: {error}") from error
     missing = [name for name in types if name not in values and not _is_optional(types[name])]
     if missing:
-        raise GaitshiftError(f"{path} is no log of gaitshift: it lacks '{missing[0]}'")
+        raise GaitshiftError(f"{path} is not a gaitshift log: it lacks '{missing[0]}'")
     return values
 
 

@@ -28,11 +28,13 @@ def read_rows(path: Path, columns: Columns, what: str) -> list[Row]:
     if tuple(reader.fieldnames or ()) != tuple(columns) or any(
         None in row or None in row.values() for row in rows
     ):
-        raise GaitshiftError(f"{path} is no table of {what}; give another --out, or --overwrite")
+        raise GaitshiftError(f"{path} is not a table of {what}; give another --out, or --overwrite")
     try:
         return [{n: kind(row[n]) if row[n] else "" for n, kind in columns.items()} for row in rows]
     except ValueError as error:
-        raise GaitshiftError(f"{path}: {error}") from error
+        raise GaitshiftError(
+            f"{path} is damaged: {error}; give another --out, or --overwrite"
+        ) from error
 
 
 def write_rows(path: Path, columns: Columns, rows: Sequence[Row]) -> None:

@@ -38,13 +38,13 @@ def read(path: Path) -> list[dict[str, str]]:
             reader = csv.DictReader(file)
             rows = list(reader)
     except (UnicodeDecodeError, csv.Error) as error:
-        raise GaitshiftError(f"{path} is damaged: {error}; remove it to go on") from error
+        raise GaitshiftError(f"{path} is damaged: {error}; remove it to continue") from error
     if rows and None in rows[-1].values():
         rows.pop()
     for number, row in enumerate(rows, start=2):
         whole = None not in row and None not in row.values()
         if not whole or not row.get("iteration", "").isdecimal():
-            raise GaitshiftError(f"{path}, line {number} is damaged; remove it to go on")
+            raise GaitshiftError(f"{path}, line {number} is damaged; remove it to continue")
     return rows
 
 

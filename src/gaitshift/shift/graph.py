@@ -91,10 +91,13 @@ class GaitGraph:
 
     def __post_init__(self) -> None:
         if not self.edges:
-            raise GaitshiftError("a gait graph needs an edge or more")
+            raise GaitshiftError("a gait graph must have at least one edge, got none")
         for edge in self.edges:
             if edge.source == edge.target:
-                raise GaitshiftError(f"edge {edge.name} leads from a gait to itself")
+                raise GaitshiftError(
+                    f"edge {edge.name}: source and target must be different gaits, got "
+                    f"{edge.source!r} for both"
+                )
             if edge.statistic not in self.statistics:
                 known = tuple(self.statistics)
                 raise GaitshiftError(
@@ -103,8 +106,8 @@ class GaitGraph:
         for a, b in combinations(self.edges, 2):
             if a.source == b.source and a.priority == b.priority:
                 raise GaitshiftError(
-                    f"edges {a.name} and {b.name} can fire in the same step: "
-                    "give them different priorities"
+                    f"edges {a.name} and {b.name} leave the same gait with the same priority "
+                    f"{a.priority}; priorities must differ"
                 )
         self._check_reach()
 
@@ -114,7 +117,9 @@ class GaitGraph:
             reached |= more
         lost = [gait for gait in self.gaits if gait not in reached]
         if lost:
-            raise GaitshiftError(f"no way leads from '{self.start}' to the gait '{lost[0]}'")
+            raise GaitshiftError(
+                f"no edges lead from the start gait '{self.start}' to the gait '{lost[0]}'"
+            )
 
     @cached_property
     def gaits(self) -> tuple[str, ...]:

@@ -42,17 +42,18 @@ class DemoConfig:
     rough_gait: str = ""
     """The gait on rough ground; that of the graph by default."""
     graph: str = DEFAULT
-    """When to shift: a shipped gait graph by name, or a TOML file. `terrain`: slopes and steps do
-    not deceive it; `height_difference`: the paper's statistic with numbers of ours; `paper`: with its
-    own; all three between the two gaits above."""
+    """When to shift: a shipped gait graph by name, or a TOML file. `terrain`, which
+    does not fire on slopes and steps; `height_difference`, the paper's statistic with our numbers;
+    `paper`, with the paper's; all three between the two gaits above."""
     alpha: float | None = None
-    """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
+    """α: values above it count as rough [m]; as for the settings below, the default is that of
+    the condition."""
     beta: float | None = None
     """β: shift to the rough gait when k exceeds it [counts]."""
     leak: float | None = None
-    """What k loses in each step [counts]."""
+    """Leak: decrease of k per step [counts]."""
     alpha_back: float | None = None
-    """α': all below it counts as flat [m]."""
+    """α': values below it count as flat [m]."""
     beta_back: float | None = None
     """β': shift back when k exceeds it [counts]."""
     hold: float | None = None
@@ -61,33 +62,33 @@ class DemoConfig:
     """What walks, by name: `policy`, trained policies; `cpg`, coupled oscillators that learned
     nothing (trot, pace, bound, walk), which go slowly and on low noise alone."""
     gaits: tuple[str, ...] = ()
-    """Gaits to show in a row instead, on a schedule and without the condition."""
+    """Gaits to show in sequence on a schedule, in place of the condition."""
     every: float = 3.0
-    """Seconds from one of `gaits` to the next."""
+    """Time between two shifts of `gaits` [s]."""
     at: tuple[float, ...] = ()
-    """Times of the shifts to the second of `gaits` and on [s], in place of `every`."""
+    """Times of the shifts between `gaits` [s], in place of `every`."""
     episodes: int = 1
-    """Robots, each on a track and with a start of its own; pictures show the first."""
+    """Number of robots, each with its own track and start; pictures show robot 0."""
     seed: int = 0
-    """Seed of the first track and start; the next robots have the next seeds."""
+    """Seed of the track and start of robot 0; robot i uses seed + i."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 1000:
-            raise GaitshiftError(f"{self.episodes} episodes: 1 to 1000 would be right")
+            raise GaitshiftError(f"episodes must be 1 to 1000, got {self.episodes}")
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if not 0.2 <= self.every <= 60:
-            raise GaitshiftError(f"a gait every {self.every} s: 0.2 to 60 s would be right")
+            raise GaitshiftError(f"every must be 0.2 to 60 s, got {self.every}")
         if len(self.gaits) == 1:
-            raise GaitshiftError("one gait alone has nothing to shift to; give two or more")
+            raise GaitshiftError(f"gaits must name two gaits or more, got {self.gaits[0]} alone")
 
         if self.at and len(self.at) != len(self.gaits) - 1:
             raise GaitshiftError(
-                f"{len(self.at)} times for {len(self.gaits)} gaits: {len(self.gaits) - 1} "
-                "would be right, one for each shift"
+                f"at must give {max(0, len(self.gaits) - 1)} times for {len(self.gaits)} gaits, "
+                f"one for each shift, got {len(self.at)}"
             )
         if any(late <= early for early, late in pairwise((0.0, *self.at))):
-            raise GaitshiftError("the times of the shifts must be positive and rising")
+            raise GaitshiftError(f"at must give rising times above 0 s, got {list(self.at)}")
 
     @property
     def shift_times(self) -> tuple[float, ...]:

@@ -93,5 +93,5 @@ def candidates(names: Sequence[str]) -> tuple[Candidate, ...]:
     unknown = [name for name in names if name not in known]
     if unknown:
         listed = ", ".join((*known, "classifier"))
-        raise GaitshiftError(f"no condition '{unknown[0]}'; known: {listed}, or all")
+        raise GaitshiftError(f"condition must be one of {listed}, or all, got '{unknown[0]}'")
     return tuple(known[name] for name in dict.fromkeys(names))

@@ -23,7 +23,7 @@ def check_sources(paths: Sequence[Path]) -> None:
             raise GaitshiftError(f"no log file {path}")
         if path.suffix not in (".npz", *TABLES):
             raise GaitshiftError(
-                f"{path}: a log ends in .npz, or is a table in {' or '.join(TABLES)}"
+                f"{path}: the name of a log must end in .npz, {' or '.join(TABLES)}"
             )
 
 
@@ -42,6 +42,6 @@ def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[LabelledRu
         log = Log.load(path)
         if not log.sensed.contact.any():
             raise GaitshiftError(
-                f"{path}: no foot ever touches; 'contact' is true where one is down"
+                f"{path}: 'contact' must be true where a foot is down, got no contact at all"
             )
         yield LabelledRun.from_log(log, _SEED.sub("", path.stem), rough_ground(log))
