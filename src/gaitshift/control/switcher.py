@@ -72,9 +72,7 @@ class Autonomous:
             sensed = replace(sensed, value=controller.value())
         rough = None if self._rough is None or truth is None else self._rough(truth)
         gaits = controller.repertoire.gaits
-        known = np.array(
-            [self.graph.gaits.index(g) if g in self.graph.gaits else -1 for g in gaits]
-        )
+        known = np.array([_index(self.graph.gaits, gait) for gait in gaits])
         before = replace(self._state, gait=known[controller.gait])
         self._state, decision = self.graph.step(before, sensed, rough)
         if decision.fired.any():

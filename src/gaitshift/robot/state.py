@@ -79,7 +79,7 @@ class Batch:
         """The record with `change(trailing axes, array)` in place of each of its arrays."""
         values = dict[str, Any]()
         for name, trailing in trailing_axes(type(self)).items():
-            value = getattr(self, name)
+            value: Any = getattr(self, name)
             if isinstance(value, Batch):
                 values[name] = value._map(change, also_time=also_time)
             elif isinstance(value, np.ndarray) and trailing is not None:
