@@ -10,10 +10,9 @@ PYTEST_ARGS ?= -n 2 --dist worksteal
 GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
 # What the wheel is tried with: quick tests that need neither torch nor a browser.
-WHEEL_TESTS := tests/test_reward_machine.py tests/test_gaits.py tests/test_terrain.py \
-    tests/test_height_difference.py tests/test_robot.py
+WHEEL_TESTS := tests/gait tests/shift tests/sim/test_terrain.py
 # What the newest versions are tried with, without torch: these, and pictures and physics.
-NEWEST_TESTS := $(WHEEL_TESTS) tests/test_plots.py tests/test_geometry.py tests/test_world.py
+NEWEST_TESTS := $(WHEEL_TESTS) tests/show/test_plots.py tests/show/test_geometry.py tests/sim/test_world.py
 
 # Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.
 BASE := $(VENV)/.base-installed
