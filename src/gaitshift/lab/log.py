@@ -153,7 +153,7 @@ def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
             entries = np.load(file)
             if not isinstance(entries, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
-            given: Any = entries["format_version"] if "format_version" in entries else None
+            given: Any = entries.get("format_version")
             version = None if given is None else int(given)
             if version is None and "qpos" in entries:
                 raise GaitshiftError(
