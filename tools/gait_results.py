@@ -11,6 +11,7 @@ from gaitshift.control import policy
 from gaitshift.gait import gaits
 from gaitshift.lab.gait_analysis import FIRST_GAITS
 from gaitshift.robot.legs import LEGS
+from gaitshift.table import markdown
 
 POLICIES = Path(policy.__file__).parent / "policies"
 PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"
@@ -153,8 +154,7 @@ def _feet(values: list[float]) -> str:
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    return markdown(head, rows) + "\n"
 
 
 if __name__ == "__main__":

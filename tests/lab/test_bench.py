@@ -37,12 +37,13 @@ from gaitshift.lab.benchmark.time_to_gait import (
     time_to_gait,
 )
 from gaitshift.lab.benchmark.vec_env import GaitVecEnv
-from gaitshift.lab.table import read_rows, write_rows
 from gaitshift.learn.export import describe, write
 from gaitshift.learn.recipe import Recipe, Stage
 from gaitshift.show.plots import time_to_gait_figure
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.table import read_typed
+from gaitshift.table import write as write_table
 
 TROT = gaits.load("trot")
 SMALL = Recipe(stages=(Stage(name="flat", iterations=4),), robots=4, steps=5, threads=1)
@@ -231,9 +232,9 @@ def test_of_robots_that_all_fall_at_once_the_line_and_the_table_say_what_there_i
     assert figures == Figures(survival=0.0, speed=None, pattern_fraction=None)
     fallen = replace(outcome(reached=False), survival=0.0, speed=None, pattern_fraction=None)
     assert _text(fallen) == "> 10 s, > 0.01 M steps (survival 0.00, – m/s, pattern –)"
-    write_rows(tmp_path / "table.csv", COLUMNS, [row_of(fallen)])
+    write_table(tmp_path / "table.csv", [row_of(fallen)], COLUMNS)
     assert (tmp_path / "table.csv").read_text().splitlines()[1].endswith(",0.0,,,0123456789ab")
-    (row,) = read_rows(tmp_path / "table.csv", COLUMNS, "trainings")
+    (row,) = read_typed(tmp_path / "table.csv", COLUMNS, "trainings")
     assert outcome_of(row) == fallen
     with pytest.raises(GaitshiftError, match="the seconds of a training is missing"):
         outcome_of(row | {"seconds": ""})
@@ -269,12 +270,12 @@ def test_trainings_of_another_recipe_are_measured_anew_and_stay_in_the_table(
 
     monkeypatch.setattr(race, "_train", told)
     table = tmp_path / "time_to_gait.csv"
-    write_rows(table, COLUMNS, [row_of(outcome(seconds=40.0))])
+    write_table(table, [row_of(outcome(seconds=40.0))], COLUMNS)
     command = ["bench", "time-to-gait", "--quick", "--out", str(tmp_path)]
     for _ in range(2):  # what the first call measured, the second knows
         main(command)
         capsys.readouterr()
-        rows = read_rows(table, COLUMNS, "trainings")
+        rows = read_typed(table, COLUMNS, "trainings")
         assert [(r["learner"], r["seconds"]) for r in rows] == [
             (OURS, 1.0),
             (BASELINE, 1.0),
@@ -372,8 +373,8 @@ def test_the_table_and_the_figure_show_every_training(tmp_path):
         )
         for seed, seconds in enumerate((base, 1.3 * base))
     ]
-    write_rows(tmp_path / "time_to_gait.csv", COLUMNS, [row_of(o) for o in outcomes])
-    rows = read_rows(tmp_path / "time_to_gait.csv", COLUMNS, "trainings")
+    write_table(tmp_path / "time_to_gait.csv", [row_of(o) for o in outcomes], COLUMNS)
+    rows = read_typed(tmp_path / "time_to_gait.csv", COLUMNS, "trainings")
     assert [outcome_of(row) for row in rows] == outcomes
     figure = time_to_gait_figure(outcomes, tmp_path / "time_to_gait.png")
     axes = figure.axes[0]
@@ -421,7 +422,7 @@ def test_the_quick_measurement_runs_from_the_command_to_the_figure(capsys, tmp_p
 
 def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):
     table = tmp_path / "time_to_gait.csv"
-    write_rows(table, COLUMNS, [row_of(outcome())])
+    write_table(table, [row_of(outcome())], COLUMNS)
     table.write_text(table.read_text().replace("True", "yes"))
     line = refusal(capsys, "time-to-gait", "--quick", "--out", str(tmp_path))
     assert str(table) in line

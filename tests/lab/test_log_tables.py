@@ -7,8 +7,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import passages, table
+from gaitshift.lab.identification import log_files, passages
 from gaitshift.robot.legs import LEGS
 
 FEET = np.array(
@@ -216,7 +217,7 @@ def test_a_faulty_table_is_named_with_its_row_or_column(tmp_path, change, messag
         ("empty.csv", b"", "cannot be read as csv"),
         (
             "head.csv",
-            ("time," + ",".join(table.REQUIRED[1:]) + ",roll,pitch\n").encode(),
+            ("time," + ",".join(log_files.REQUIRED[1:]) + ",roll,pitch\n").encode(),
             "no rows",
         ),
         ("noise.parquet", b"\x00\x01 this is none", "cannot be read as parquet"),

@@ -26,7 +26,7 @@ from gaitshift.lab.reproduction.plan import Plan
 from gaitshift.lab.reproduction.pool import train_all
 from gaitshift.lab.reproduction.results import Results, Seeds
 from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER, REFERENCE
-from gaitshift.lab.reproduction.tables import curve_rows, run_rows, write
+from gaitshift.lab.reproduction.tables import curve_rows, run_rows
 from gaitshift.lab.reproduction.told import Told
 from gaitshift.lab.reproduction.training import FAILED, is_over, train
 from gaitshift.learn.learner import DivergedError
@@ -35,6 +35,7 @@ from gaitshift.learn.run import Run
 from gaitshift.show.plots.learning import Landmarks, comparison_curves, reward_curves
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.table import write
 from waiting import PATIENCE, wait_until
 
 CHANGES = {
@@ -311,8 +312,8 @@ def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
         ("blind", "trot"): seeds("blind", "trot", [course(200, walks=61)] * 2, broken=1),
     }
     first = Results(plan=Plan(), seeds=table)
-    write(run_rows(first), tmp_path / "runs.csv")
-    write(list(curve_rows(first)), tmp_path / "curves.csv")
+    write(tmp_path / "runs.csv", run_rows(first))
+    write(tmp_path / "curves.csv", list(curve_rows(first)))
     told = Told.read(Plan(), tmp_path)
     again = Results.read(Plan(), tmp_path / "none", told)
     assert findings(again) == findings(first)
@@ -332,8 +333,8 @@ def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
 def test_a_damaged_report_is_named(name, old, new, says, tmp_path):
     table = {("blind", "trot"): seeds("blind", "trot", [course(200, walks=61)] * 3)}
     results = Results(plan=Plan(), seeds=table)
-    write(run_rows(results), tmp_path / "runs.csv")
-    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    write(tmp_path / "runs.csv", run_rows(results))
+    write(tmp_path / "curves.csv", list(curve_rows(results)))
     path = tmp_path / name
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
@@ -343,13 +344,13 @@ def test_a_damaged_report_is_named(name, old, new, says, tmp_path):
 
 def test_a_figure_of_a_policy_that_is_no_number_is_named(tmp_path):
     results = Results(plan=Plan(), seeds=like_the_paper())
-    write(run_rows(results), tmp_path / "runs.csv")
-    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    write(tmp_path / "runs.csv", run_rows(results))
+    write(tmp_path / "curves.csv", list(curve_rows(results)))
     row = {"setting": "paper", "gait": "pace", "seed": 1, "walks_from_iteration": 86}
-    write([row | {"survival": 1.0, "speed_mean": None}], tmp_path / "gaits.csv")
+    write(tmp_path / "gaits.csv", [row | {"survival": 1.0, "speed_mean": None}])
     told = Told.read(Plan(), tmp_path).figures
     assert told == {"paper-pace-1": {"survival": 1.0, "speed_mean": None}}
-    write([row | {"survival": "all", "speed_mean": None}], tmp_path / "gaits.csv")
+    write(tmp_path / "gaits.csv", [row | {"survival": "all", "speed_mean": None}])
     with pytest.raises(GaitshiftError, match=r"gaits\.csv, paper-pace-1 is damaged: .*'all'"):
         Told.read(Plan(), tmp_path)
 
@@ -357,8 +358,8 @@ def test_a_figure_of_a_policy_that_is_no_number_is_named(tmp_path):
 def test_a_report_of_another_recipe_is_not_added_to(tmp_path):
     plan = Plan()
     results = Results(plan=plan, seeds=like_the_paper())
-    write(run_rows(results), tmp_path / "runs.csv")
-    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    write(tmp_path / "runs.csv", run_rows(results))
+    write(tmp_path / "curves.csv", list(curve_rows(results)))
     assert len(Told.read(plan, tmp_path).courses) == 15
     assert len(Told.read(replace(plan, seeds=2), tmp_path).courses) == 6, "as far as it is planned"
     with pytest.raises(GaitshiftError, match="paper-trot-0 with another recipe"):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from gaitshift import table
 from gaitshift.cli.growing import kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.control import policy
@@ -20,7 +21,6 @@ from gaitshift.lab.benchmark.outcome import (
     summary,
 )
 from gaitshift.lab.benchmark.speed import SpeedConfig, environment_speed, training_speed
-from gaitshift.lab.table import write_rows
 
 if TYPE_CHECKING:
     from gaitshift.lab.benchmark.time_to_gait import TimeToGait
@@ -174,7 +174,7 @@ class Bench:
                 say(f"{outcome.gait}, seed {outcome.seed}, {outcome.learner}: {_text(outcome)}")
                 if out is not None:
                     told = [*outcomes, *(one for one in known if not _told(one, outcomes))]
-                    write_rows(out / TABLE, COLUMNS, [row_of(one) for one in told])
+                    table.write(out / TABLE, [row_of(one) for one in told], COLUMNS)
                     _draw([one for one in told if is_of(config, one)], out)
         found = summary(outcomes)
         if self.json:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from gaitshift.cli.output import check_folder
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.table import Columns, Row, read_rows
+from gaitshift.table import Columns, Row, read_typed
 
 README = "README.md"
 
@@ -28,7 +28,7 @@ def kept_rows(
     """
     if not path.is_file():
         check_folder(path.parent, overwrite=overwrite, ours=(path.name, README))
-    rows = [] if overwrite else read_rows(path, columns, what)
+    rows = [] if overwrite else read_typed(path, columns, what)
     for row in rows:
         for name, wanted in (alike or {}).items():
             if row[name] != wanted:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gaitshift import table
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.table import write_rows
 from gaitshift.shift import CONDITIONS
 
 TABLE = "crossings.csv"
@@ -82,7 +82,7 @@ class Study:
                         report=report,
                     )
                 rows.append(row_of(way, amplitude, self.seed, crossings))
-                write_rows(path, COLUMNS, rows)
+                table.write(path, rows, COLUMNS)
         from gaitshift.show.plots.crossings import crossings_figure  # matplotlib is slow to import
 
         crossings_figure(rows, self.out / PICTURE)

@@ -117,7 +117,7 @@ class _Bar:
     """Progress of a training: steps/s, speed, survival, the last verdict and time left."""
 
     def __init__(self, run: "Run") -> None:
-        from gaitshift.learn.lines import last
+        from gaitshift.learn.progress import last
         from gaitshift.learn.run import PROGRESS, VERDICTS
 
         self.row: Row = last(run.folder / PROGRESS, run.iteration)

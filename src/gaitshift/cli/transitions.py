@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import tyro
 
+from gaitshift import table
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.table import write_rows
 from gaitshift.sim.terrain import from_spec
 
 TABLE, PAGE = "transitions.csv", "page.html"
@@ -48,8 +48,7 @@ class Transitions:
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.lab.studies import Pair, run_pair
-            from gaitshift.lab.studies.transition_page import page
-            from gaitshift.lab.studies.transition_table import COLUMNS, is_of, row_of
+            from gaitshift.lab.studies.transition_table import COLUMNS, is_of, page, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
@@ -85,7 +84,7 @@ class Transitions:
                         report=report,
                     )
                 rows.append(row_of(pair, ground, self.seed, outcomes))
-                write_rows(path, COLUMNS, rows)
+                table.write(path, rows, COLUMNS)
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         (self.out / README).write_text(page(rows, command))
@@ -99,7 +98,7 @@ class Transitions:
 
     def _draw(self, rows: list[dict[str, Any]]) -> None:
         """A map a ground, of all that the table has."""
-        from gaitshift.lab.studies.transition_page import picture_of
+        from gaitshift.lab.studies.transition_table import picture_of
         from gaitshift.show.plots.transitions import transition_map  # matplotlib is slow to import
 
         for ground in dict.fromkeys(row["ground"] for row in rows):

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.log_files import columns_of
 from gaitshift.lab.identification.recording import Recording, Way
-from gaitshift.lab.identification.table import columns_of
 from gaitshift.shift import (
     AnyStatistic,
     AttitudeVariance,

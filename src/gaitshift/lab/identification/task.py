@@ -10,8 +10,8 @@ from gaitshift.lab.identification.candidates import CANDIDATES, Candidate, candi
 from gaitshift.lab.identification.classifier import NAME, RoughnessClassifier
 from gaitshift.lab.identification.judging import Judged, Replayed, judge, replay_rules
 from gaitshift.lab.identification.kept import Kept, Stamp, stamp
+from gaitshift.lab.identification.log_files import check_sources, recordings
 from gaitshift.lab.identification.recording import Way
-from gaitshift.lab.identification.sources import check_sources, recordings
 from gaitshift.lab.identification.tuning import Tried, Tuned, as_given, try_grids, tune
 
 ALL = "all"

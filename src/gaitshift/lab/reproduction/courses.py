@@ -1,6 +1,5 @@
 """The course of runs: what each iteration was like, and the iterations that matter."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
 
 WALKING_SPEED = 0.8
@@ -46,9 +46,8 @@ class Course:
     def read(cls, path: Path) -> "Course":
         """The course in a `progress.csv`."""
         try:
-            with path.open(newline="") as file:
-                return cls.of(list(csv.DictReader(file)))
-        except (OSError, KeyError, ValueError, TypeError) as error:
+            return cls.of(table.read(path))
+        except (GaitshiftError, KeyError, ValueError) as error:
             raise GaitshiftError(f"{path} is no progress of a run: {error}") from error
 
     @classmethod

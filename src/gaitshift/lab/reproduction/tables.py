@@ -1,9 +1,6 @@
 """The small CSV files of a reproduction."""
 
-import csv
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 from gaitshift.lab.reproduction.courses import DECIMALS
 from gaitshift.lab.reproduction.judging import Judged
@@ -11,10 +8,9 @@ from gaitshift.lab.reproduction.plan import ABLATED
 from gaitshift.lab.reproduction.results import Results, Seeds
 from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
 from gaitshift.lab.reproduction.told import fingerprint
+from gaitshift.table import Row
 
 ABLATED_RUNS = "ablations.csv"
-
-Row = dict[str, Any]
 
 
 def gait_rows(judged: list[Judged]) -> list[Row]:
@@ -66,14 +62,6 @@ def curve_rows(results: Results) -> Iterator[Row]:
             ]
             for index, entries in enumerate(zip(*columns, strict=True)):
                 yield {**run, "iteration": index + 1, **dict(zip(DECIMALS, entries, strict=True))}
-
-
-def write(rows: list[Row], path: Path) -> None:
-    """Writes rows of the same columns."""
-    with path.open("w", newline="") as file:
-        lines = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        lines.writeheader()
-        lines.writerows(rows)
 
 
 def _ablation_row(setting: Setting, seeds: Seeds) -> Row:

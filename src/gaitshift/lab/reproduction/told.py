@@ -1,6 +1,5 @@
 """What an earlier report tells of its runs, so that others can be added to it."""
 
-import csv
 import hashlib
 import json
 from collections.abc import Mapping
@@ -8,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.reproduction.courses import Course
 from gaitshift.lab.reproduction.plan import Job, Plan
@@ -61,7 +61,7 @@ class Told:
             if key in names:
                 try:
                     courses[names[key]] = Course.of([row for _, row in rows])
-                except (KeyError, ValueError, TypeError) as error:
+                except (KeyError, ValueError) as error:
                     raise GaitshiftError(f"{out / CURVES} is damaged: {error}") from error
         for key, name in names.items():
             whole = jobs[key].recipe.iterations
@@ -88,9 +88,8 @@ def fingerprint(job: Job) -> str:
 def _rows(path: Path) -> list[tuple[tuple[str, ...], dict[str, str]]]:
     """The lines of a table after the runs that they are of."""
     try:
-        with path.open(newline="") as file:
-            return [(tuple(row[name] for name in KEY), row) for row in csv.DictReader(file)]
-    except (OSError, KeyError, UnicodeDecodeError) as error:
+        return [(tuple(row[name] for name in KEY), row) for row in table.read(path)]
+    except KeyError as error:
         raise GaitshiftError(f"{path} is damaged: {error}") from error
 
 
@@ -99,5 +98,5 @@ def _numbers(row: Mapping[str, str], where: str) -> dict[str, float | None]:
     names = [name for name in row if name not in (*KEY, "walks_from_iteration")]
     try:
         return {name: float(row[name]) if row[name] else None for name in names}
-    except (ValueError, TypeError) as error:
+    except ValueError as error:
         raise GaitshiftError(f"{where} is damaged: {error}") from error

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from gaitshift.lab.identification import wilson
 from gaitshift.lab.studies.crossing import AFTER, BEFORE, NOISE, PATIENCE, Crossings, Way
-from gaitshift.lab.table import Row
+from gaitshift.table import Row, markdown
 
 COLUMNS: dict[str, type] = {
     "amplitude": float,
@@ -105,10 +105,9 @@ def page(rows: Sequence[Row], command: str) -> str:
     ]
     for amplitude in dict.fromkeys(row["amplitude"] for row in rows):
         of = [row for row in rows if row["amplitude"] == amplitude]
-        lines = [head, ("---",) * len(head), *(_cells(row) for row in of)]
         parts += [
             f"## {amplitude:g} m",
-            "\n".join(f"| {' | '.join(line)} |" for line in lines),
+            markdown(head, [_cells(row) for row in of]),
         ]
     return "\n\n".join(parts) + "\n"
 

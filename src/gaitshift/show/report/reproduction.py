@@ -14,6 +14,7 @@ from gaitshift.lab.reproduction.results import Results
 from gaitshift.lab.reproduction.settings import LOCKOUT
 from gaitshift.lab.reproduction.told import CURVES, GAITS, RUNS, Told
 from gaitshift.show.plots import reproduction as figures
+from gaitshift.table import Row, markdown, write
 
 README = "README.md"
 
@@ -53,7 +54,7 @@ def write_report(
     }
     written = [name for name, rows in parts.items() if rows]
     for name in written:
-        tables.write(parts[name], out / name)
+        write(out / name, parts[name])
     written += figures.draw(results, judged, out)
     (out / README).write_text(_readme(results, found, judged, ablations, written))
     return {
@@ -69,7 +70,7 @@ def _readme(
     results: Results,
     found: list[Finding],
     judged: list[Judged],
-    ablations: list[tables.Row],
+    ablations: list[Row],
     written: list[str],
 ) -> str:
     parts = ["# The paper's recipe, run again", _introduction(results)]
@@ -120,7 +121,7 @@ def _introduction(results: Results) -> str:
 
 
 def _verdicts(found: list[Finding]) -> str:
-    return _table(("statement", "verdict"), [(f.name, f"**{f.verdict}**") for f in found])
+    return markdown(("statement", "verdict"), [(f.name, f"**{f.verdict}**") for f in found])
 
 
 def _gait_table(judged: list[Judged]) -> str:
@@ -135,7 +136,7 @@ def _gait_table(judged: list[Judged]) -> str:
         "touchdowns a cycle",
         "cost of transport",
     )
-    return _table(
+    return markdown(
         head,
         [
             (
@@ -149,7 +150,7 @@ def _gait_table(judged: list[Judged]) -> str:
     )
 
 
-def _ablation_table(rows: list[tables.Row]) -> str:
+def _ablation_table(rows: list[Row]) -> str:
     columns = {
         "group": "question",
         "label": "setting",
@@ -162,15 +163,10 @@ def _ablation_table(rows: list[tables.Row]) -> str:
         "late_stance_fraction": "share of steps in the stance of the state",
     }
     shown = [{**row, "walking": f"{row['walking']} of {row['seeds']}"} for row in rows]
-    return _table(
+    return markdown(
         tuple(columns.values()),
         [tuple(_text(row[key], "never") for key in columns) for row in shown],
     )
-
-
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _text(value: str | float | None, nothing: str = "–") -> str:

@@ -17,13 +17,13 @@ from gaitshift.lab.identification.report import (
     course_rows,
     hardest_first,
 )
-from gaitshift.lab.studies.transition_page import HEAD, row_cells
-from gaitshift.lab.table import Row
+from gaitshift.lab.studies.transition_table import HEAD, row_cells
 from gaitshift.show.plots.identification import FALSE, LATEST, LINES, NOTICED, OTHERS, roc
 from gaitshift.show.plots.palette import gait_colours
 from gaitshift.show.report.data import title_of
 from gaitshift.show.report.figures import Axis, Curve, Kind, Said, curves, heat_map
 from gaitshift.show.report.page import facts_table, figure, table, write_page
+from gaitshift.table import Row
 
 _NOTICED = {
     "rough": "rough ground against all others",

@@ -1,18 +1,22 @@
-"""Logs of anybody's robot: CSV or Parquet, read in a stream and cut into passages."""
+"""Recordings from files: npz logs of this package, and tables (CSV, Parquet) of any robot."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.labels import rough_ground
 from gaitshift.lab.identification.recording import Recording, Way
+from gaitshift.lab.log import Log
 from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
 from gaitshift.robot.legs import LEGS
 from gaitshift.shift import LegOdometry
+from gaitshift.table import STREAMED, stream
 
 _AXES = ("x", "y", "z")
 CONTACTS = tuple(f"contact_{leg}" for leg in LEGS)
@@ -29,27 +33,60 @@ VECTORS = {"velocity_b": "velocity", "angular_velocity_b": "angular_velocity"}
 SCALARS = ("yaw", "power", "speed_command", "stride", "value")
 """Optional signals of one column each; units as in `Signals`."""
 
-BATCH, BLOCK = 65_536, 1 << 24
-"""What is read at a time: rows of a Parquet file, bytes of a CSV file."""
-
 LONGEST = 60_000
 """Rows of a passage; a longer stretch is cut."""
 
 _LEAST_GRAVITY = 1e-6
 """Length below which a vector of gravity has no direction, in whatever unit it is."""
 
-_KNOWN = (
-    *REQUIRED,
+_NUMBERS = (
+    "time",
+    *FEET,
     *(name for names in ATTITUDES for name in names),
     *SCALARS,
     *(f"{prefix}_{axis}" for prefix in VECTORS.values() for axis in _AXES),
 )
+_FLAGS = (*CONTACTS, "rough")
+"""Columns that may hold true and false."""
+
+_SEED = re.compile(r"-\d+$")
 
 
 def columns_of(signal: str) -> tuple[str, ...]:
     """Columns that an optional signal is read from."""
     prefix = VECTORS.get(signal)
     return (signal,) if prefix is None else tuple(f"{prefix}_{axis}" for axis in _AXES)
+
+
+def check_sources(paths: Sequence[Path]) -> None:
+    """`GaitshiftError` unless all are files of a kind that can be read: asked before any work."""
+    for path in paths:
+        if not path.is_file():
+            raise GaitshiftError(f"no log file {path}")
+        if path.suffix not in (".npz", *STREAMED):
+            raise GaitshiftError(
+                f"{path}: a log ends in .npz, or is a table in {' or '.join(STREAMED)}"
+            )
+
+
+def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[Recording]:
+    """What the files hold, one after the other, tables passage by passage for this way.
+
+    A recording has the name of its file, less a seed at its end.
+
+    Raises:
+        GaitshiftError: a file cannot be read, with what is wrong in it.
+    """
+    for path in paths:
+        if path.suffix in STREAMED:
+            yield from passages(path, way)
+            continue
+        log = Log.load(path)
+        if not log.contact.any():
+            raise GaitshiftError(
+                f"{path}: no foot ever touches; 'contact' is true where one is down"
+            )
+        yield Recording.from_log(log, _SEED.sub("", path.stem), rough_ground(log))
 
 
 def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
@@ -65,7 +102,7 @@ def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
     columns: dict[str, list[np.ndarray]] = {}
     rows, before, period, touched, down = 0, np.nan, np.nan, False, 0.0
     may_begin_rough = way == "rough"
-    for batch in _batches(path):
+    for batch in stream(path, numbers=_NUMBERS, flags=_FLAGS):
         _check_columns(path, batch)
         period = _check_values(path, batch, rows, before, period)
         before = float(batch["time"][-1])
@@ -92,47 +129,6 @@ def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
     whole = {name: np.concatenate(parts) for name, parts in columns.items()}
     if len(whole["time"]) > 1:
         yield _recording(path, whole, slice(0, len(whole["time"])))
-
-
-def _batches(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """Batches of rows, as arrays by the names of their columns."""
-    import pyarrow as pa  # only where a table is read
-    from pyarrow import csv, parquet
-
-    if not path.is_file():
-        raise GaitshiftError(f"no log file {path}")
-    from_parquet, from_csv = cast(Any, parquet), cast(Any, csv)
-    # Contacts and labels may be true and false; a number may begin as if it were a whole one.
-    arrow = cast(Any, pa)
-    numbers = {name: arrow.float64() for name in _KNOWN if name not in (*CONTACTS, "rough")}
-    try:
-        if path.suffix == ".parquet":
-            with from_parquet.ParquetFile(path) as file:
-                for batch in file.iter_batches(BATCH):
-                    yield _arrays(path, batch)
-        else:
-            read = from_csv.ReadOptions(block_size=BLOCK)
-            convert = from_csv.ConvertOptions(column_types=numbers)
-            with from_csv.open_csv(path, read_options=read, convert_options=convert) as file:
-                for batch in file:
-                    yield _arrays(path, batch)
-    except UnicodeError as error:
-        raise GaitshiftError(f"{path} is not written in UTF-8: {error}") from error
-    except (arrow.ArrowException, OSError) as error:
-        line = (str(error).splitlines() or [type(error).__name__])[0]
-        raise GaitshiftError(f"{path} cannot be read as {path.suffix[1:]}: {line}") from error
-
-
-def _arrays(path: Path, batch: Any) -> dict[str, np.ndarray]:
-    read: dict[str, np.ndarray] = {}
-    for name, column in zip(batch.schema.names, batch.columns, strict=True):
-        if name not in _KNOWN:
-            continue
-        try:
-            read[name] = column.cast("float64", safe=False).to_numpy(zero_copy_only=False)
-        except Exception as error:  # arrow has an error for each type
-            raise GaitshiftError(f"{path}: column '{name}' does not hold numbers") from error
-    return read
 
 
 def _check_columns(path: Path, batch: dict[str, np.ndarray]) -> None:
