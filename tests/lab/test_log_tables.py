@@ -124,7 +124,7 @@ def test_whole_numbers_are_numbers(tmp_path):
 
 def test_contacts_and_labels_may_be_true_and_false(tmp_path):
     data = columns()
-    for name in (*table.CONTACTS, "rough"):
+    for name in (*log_files.CONTACTS, "rough"):
         data[name] = [str(bool(value)).lower() for value in data[name]]
     (plain, _), (words, _) = (passages(written(tmp_path, d)) for d in (columns(), data))
     np.testing.assert_array_equal(words.contact, plain.contact)

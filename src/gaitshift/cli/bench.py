@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 from gaitshift import table
-from gaitshift.cli.growing import kept_rows
-from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.cli.output import check_table_folder, emit_json, emit_table, progress, say
 from gaitshift.control import policy
 from gaitshift.data import located
 from gaitshift.errors import GaitshiftError
@@ -163,9 +162,12 @@ class Bench:
         config, out = options.config(), options.out
         known: list[Outcome] = []
         if out is not None:
-            kept = kept_rows(out / TABLE, COLUMNS, "trainings", overwrite=options.overwrite)
-            with located(str(out / TABLE)):
-                known = [outcome_of(row) for row in kept]
+            path = out / TABLE
+            check_table_folder(path, overwrite=options.overwrite)
+            earlier = [] if options.overwrite else table.read_typed(path, COLUMNS, "trainings")
+            with located(str(path)):
+                known = [outcome_of(row) for row in earlier]
+            out.mkdir(parents=True, exist_ok=True)
         outcomes: list[Outcome] = []
         with progress("training") as report:
             for outcome in time_to_gait(config, known):

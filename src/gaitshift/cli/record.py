@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import tyro
@@ -15,6 +16,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select
 from gaitshift.lab.log import Log
+from gaitshift.lab.resume import Part, Report, run_missing
+from gaitshift.table import Row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,27 +61,18 @@ class Record:
                 f"two of the policies are of the gait '{twice[0]}', and would write the same logs; "
                 "record them one by one, each with an --out of its own"
             )
-        kept = self._kept([(policy, course) for policy in loaded for course in chosen])
+        asked = [(policy, course) for policy in loaded for course in chosen]
+        found = self._found(asked)
         self.out.mkdir(parents=True, exist_ok=True)
-        rows: list[dict[str, Any]] = []
-        for policy in loaded:
-            for course in chosen:
-                path = self._path(policy, course)
-                if path in kept:
-                    say(f"{path} is there already, and kept")
-                    rows.append(kept[path])
-                    continue
-                with progress(f"{policy.gait}, {course.name}") as report:
-                    log = run_course(
-                        policy,
-                        course,
-                        robots=self.robots,
-                        seconds=self.seconds,
-                        seed=self.seed,
-                        report=report,
-                    )
-                log.save(path)
-                rows.append(_row(path, log))
+        parts = [
+            Part(
+                name=str(path := self._path(policy, course)),
+                find=partial(found.get, path),
+                work=partial(self._record, policy, course),
+            )
+            for policy, course in asked
+        ]
+        rows = run_missing(parts, progress=progress, say=say)
         if self.json:
             emit_json({"logs": rows})
         else:
@@ -91,13 +85,27 @@ class Record:
     def _path(self, policy: Policy, course: Course) -> Path:
         return self.out / f"{policy.gait}-{course.name}-{self.seed}.npz"
 
-    def _kept(self, asked: Sequence[tuple[Policy, Course]]) -> dict[Path, dict[str, Any]]:
-        """What is told of the logs that are there already, each as long and of as many as asked.
+    def _record(self, policy: Policy, course: Course, report: Report) -> Row:
+        """Records a log and writes it."""
+        log = run_course(
+            policy,
+            course,
+            robots=self.robots,
+            seconds=self.seconds,
+            seed=self.seed,
+            report=report,
+        )
+        path = self._path(policy, course)
+        log.save(path)
+        return _row(path, log)
+
+    def _found(self, asked: Sequence[tuple[Policy, Course]]) -> dict[Path, Row]:
+        """Rows of the logs that are there already, each as long and of as many robots as asked.
 
         Raises:
             GaitshiftError: one holds something else.
         """
-        kept: dict[Path, dict[str, Any]] = {}
+        found: dict[Path, Row] = {}
         steps = RolloutConfig(seconds=self.seconds).steps
         for policy, course in asked:
             path = self._path(policy, course)
@@ -111,11 +119,11 @@ class Record:
                     f"{path} is there already and holds {robots} robots × {log.time[-1]:g} s, not "
                     f"{self.robots} × {self.seconds:g} s; ask for the same, or --overwrite"
                 )
-            kept[path] = _row(path, log)
-        return kept
+            found[path] = _row(path, log)
+        return found
 
 
-def _row(path: Path, log: Log) -> dict[str, Any]:
+def _row(path: Path, log: Log) -> Row:
     last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
     x = np.take_along_axis(log.qpos[..., 0].astype(float), last[None], axis=0)[0]
     return {

@@ -3,15 +3,24 @@
 import shlex
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gaitshift import table
-from gaitshift.cli.growing import README, check_numbers, kept_rows
-from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.cli.output import (
+    README,
+    check_numbers,
+    check_table_folder,
+    emit_json,
+    emit_table,
+    progress,
+    say,
+)
 from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.resume import Report, ResumableTable, run_missing
 from gaitshift.shift import CONDITIONS
+from gaitshift.table import Row
 
 TABLE = "crossings.csv"
 
@@ -47,8 +56,8 @@ class Study:
     def run(self) -> None:
         """Crosses, and tells what came of it."""
         try:
-            from gaitshift.lab.studies.crossing import cross, ways
-            from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, is_of, page, row_of
+            from gaitshift.lab.studies.crossing import Way, cross, ways
+            from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, page, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"study needs the package '{error.name}'; install gaitshift[identify]"
@@ -60,29 +69,33 @@ class Study:
         every = ways(self.flat_gait, self.rough_gait, self.conditions)
         loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
         path = self.out / TABLE
-        rows = kept_rows(
+        check_table_folder(path, overwrite=self.overwrite)
+        table = ResumableTable.open(
             path,
             COLUMNS,
             "crossings",
+            key=("amplitude", "way"),
+            same={"seed": self.seed, "runs": self.runs},
             overwrite=self.overwrite,
-            alike={"seed": self.seed, "runs": self.runs},
         )
-        for amplitude in self.amplitudes:
-            for way in every:
-                if any(is_of(row, way, amplitude) for row in rows):
-                    say(f"{way.name} over {amplitude:g} m is there already, and kept")
-                    continue
-                with progress(f"{way.name}, {amplitude:g} m") as report:
-                    crossings = cross(
-                        loaded,
-                        way,
-                        amplitude=amplitude,
-                        runs=self.runs,
-                        seed=self.seed,
-                        report=report,
-                    )
-                rows.append(row_of(way, amplitude, self.seed, crossings))
-                table.write(path, rows, COLUMNS)
+
+        def crossed(way: Way, amplitude: float, report: Report) -> Row:
+            crossings = cross(
+                loaded, way, amplitude=amplitude, runs=self.runs, seed=self.seed, report=report
+            )
+            return row_of(way, amplitude, self.seed, crossings)
+
+        parts = [
+            table.part(
+                (amplitude, way.name),
+                f"{way.name} over {amplitude:g} m",
+                partial(crossed, way, amplitude),
+            )
+            for amplitude in self.amplitudes
+            for way in every
+        ]
+        run_missing(parts, progress=progress, say=say)
+        rows = table.rows
         from gaitshift.show.plots.crossings import crossings_figure  # matplotlib is slow to import
 
         crossings_figure(rows, self.out / PICTURE)

@@ -72,11 +72,6 @@ def mean_of(values: Float[np.ndarray, " K"]) -> tuple[float | str, float | str]:
     return round(float(values.mean()), 4), round(half, 4)
 
 
-def is_of(row: Row, way: Way, amplitude: float) -> bool:
-    """Whether a row holds the crossings of this way over this noise."""
-    return (row["amplitude"], row["way"]) == (amplitude, way.name)
-
-
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
     head = (

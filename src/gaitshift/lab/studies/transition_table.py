@@ -82,11 +82,6 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
     }
 
 
-def is_of(row: Row, pair: Pair, ground: str) -> bool:
-    """Whether a row holds the shifts of this pair on this ground."""
-    return (row["old"], row["new"], row["ground"]) == (pair.old, pair.new, ground)
-
-
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
     parts = [_INTRODUCTION, f"Made by `{command}`. [As a page](page.html) to hover over."]
