@@ -22,7 +22,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification import Grid, Tally, choose, passages
 from gaitshift.lab.identification.candidates import BETAS, CANDIDATES
 from gaitshift.lab.identification.chatter import chattered, shifts
-from gaitshift.lab.identification.facing import facing
+from gaitshift.lab.identification.ground import facing
 from gaitshift.lab.identification.passage import best_beta, passage_grid, passage_scores
 from gaitshift.lab.identification.report import (
     condition_cells,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.lab.identification.grid import first_firings
+from gaitshift.lab.identification.firings import first_firings
 from gaitshift.lab.identification.recording import Recording, Way
 from gaitshift.shift import AnyStatistic, Condition, Rule, Signals, load_condition
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.tally import Grid, Tally
+from gaitshift.lab.identification.firings import Grid, Tally
 
 HEADROOM = 1.25
 """No false shift on the recordings of the choice even at a β smaller by this factor; ours: what is

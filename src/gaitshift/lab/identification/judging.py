@@ -8,13 +8,17 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.chatter import Said, chattered, ever_fires, in_turn, shifts
-from gaitshift.lab.identification.facing import facing
-from gaitshift.lab.identification.grid import first_firings, steps_alive
+from gaitshift.lab.identification.firings import (
+    Tally,
+    detections,
+    first_firings,
+    join_by_name,
+    steps_alive,
+)
+from gaitshift.lab.identification.ground import facing
 from gaitshift.lab.identification.passage import longest_passage, passage_scores
 from gaitshift.lab.identification.recording import Recording
-from gaitshift.lab.identification.scores import detections
 from gaitshift.lab.identification.statistics import auc, auc_interval
-from gaitshift.lab.identification.tally import Tally, join_by_name
 from gaitshift.lab.identification.tuning import Tuned
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.labels import rough_ground
+from gaitshift.lab.identification.ground import rough_ground
 from gaitshift.lab.identification.recording import Recording, Way
 from gaitshift.lab.log import Log
 from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field, replace
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.candidates import BETAS, Candidate
 from gaitshift.lab.identification.choice import Choice, choose
-from gaitshift.lab.identification.facing import facing
-from gaitshift.lab.identification.grid import first_firings
+from gaitshift.lab.identification.firings import Grid, Tally, first_firings, join_by_name
+from gaitshift.lab.identification.ground import facing
 from gaitshift.lab.identification.passage import GridScores, best_beta, passage_grid
 from gaitshift.lab.identification.recording import Recording, Way
-from gaitshift.lab.identification.tally import Grid, Tally, join_by_name
 from gaitshift.shift import Rule
 
 
