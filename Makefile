@@ -4,10 +4,16 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+NEWEST := build/newest
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
-PYTEST_ARGS ?= -n 2
+PYTEST_ARGS ?= -n 2 --dist worksteal
 GAITS ?= trot pace bound pronk walk three_one half_bound gallop
 SEED ?= 0
+# What the wheel is tried with: quick tests that need neither torch nor a browser.
+WHEEL_TESTS := tests/test_reward_machine.py tests/test_gaits.py tests/test_terrain.py \
+    tests/test_height_difference.py tests/test_robot.py
+# What the newest versions are tried with, without torch: these, and pictures and physics.
+NEWEST_TESTS := $(WHEEL_TESTS) tests/test_plots.py tests/test_geometry.py tests/test_world.py
 
 # Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.
 BASE := $(VENV)/.base-installed
@@ -17,15 +23,18 @@ STUBS := typings/.made
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test check bench policies docs lock player clean
+.PHONY: help demo test test-all check wheel newest bench policies docs lock player clean
 
 help: ## list what can be made
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(BASE) ## a robot shifts its gait by itself: out/demo (a light install, without torch)
 	@$(BIN)/gaitshift demo --out out/demo --overwrite
 
-test: $(DEV) ## run the tests; PYTEST_ARGS="-k switching" for some of them
+test: $(DEV) ## run the tests but for the slow ones; PYTEST_ARGS="-k switching" for some of them
+	@$(BIN)/python -m pytest -m 'not slow' $(PYTEST_ARGS)
+
+test-all: $(DEV) ## run the slow tests as well: trainings, pages in a browser, the documentation
 	@$(BIN)/python -m pytest $(PYTEST_ARGS)
 
 check: $(DEV) $(STUBS) ## lint, format, types and floors
@@ -33,6 +42,18 @@ check: $(DEV) $(STUBS) ## lint, format, types and floors
 	@$(BIN)/ruff format --check --quiet
 	@$(BIN)/basedpyright
 	@$(BIN)/lint-imports --no-logo
+
+wheel: $(DEV) ## build wheel and sdist, try the wheel on Python 3.11 to 3.13 and with old packages
+	@$(BIN)/python tools/check_wheel.py $(WHEEL_TESTS)
+
+newest: $(DEV) ## the newest versions that pyproject.toml allows, on some of the tests
+	@$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(NEWEST)
+	@$(BIN)/uv pip install --quiet --python $(NEWEST) --upgrade --editable '.[identify,view,test]'
+	@echo 'newer than requirements.lock:'
+	@$(BIN)/uv pip freeze --quiet --python $(NEWEST) --exclude-editable > $(NEWEST)/installed
+	@sed 's/ *;.*//' requirements.lock | grep -vxFf - $(NEWEST)/installed || echo nothing
+	@$(NEWEST)/bin/gaitshift demo --no-video --out $(NEWEST)/demo --overwrite >/dev/null
+	@$(NEWEST)/bin/python -m pytest -n 2 --tb=line -rfE $(NEWEST_TESTS)
 
 bench: $(DEV) ## speed of the environment and of training on this machine
 	@$(BIN)/gaitshift bench

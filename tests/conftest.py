@@ -4,17 +4,12 @@ import os
 import signal
 
 import pytest
-from beartype import BeartypeConf, beartype
 from hypothesis import HealthCheck, settings
-from jaxtyping import install_import_hook
 
 import browsing
+import checking
 
-check_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
-"""beartype that takes an int for a float, as type checkers do (PEP 484)."""
-
-# Before anything of gaitshift is imported: its annotations then hold whenever a test runs.
-install_import_hook("gaitshift", "conftest.check_types")
+checking.install()
 
 if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
     os.environ.setdefault("MUJOCO_GL", "egl")
@@ -29,11 +24,23 @@ settings.register_profile("ci", settings.get_profile("here"), max_examples=50, d
 settings.load_profile("ci" if os.environ.get("CI") else "here")
 
 
-@pytest.fixture
-def browser():
-    """The system's Chromium."""
+def pytest_runtest_setup():
+    checking.begin_test()
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """The system's Chromium; one for all tests."""
     sync_api = pytest.importorskip("playwright.sync_api")
     with sync_api.sync_playwright() as play:
-        chromium = browsing.launched(play)
-        yield chromium
-        chromium.close()
+        launched = browsing.launched(play)
+        yield launched
+        launched.close()
+
+
+@pytest.fixture
+def browser(chromium):
+    """The browser, with no page open; a test's pages are closed after it."""
+    yield chromium
+    for context in chromium.contexts:
+        context.close()

@@ -1,6 +1,6 @@
 """The documentation: every block of code and every command in it is run, and the site is built."""
 
-import re
+import json
 import runpy
 import shlex
 import shutil
@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from gaitshift.cli import main
+from pages import codes, fences, links, rows
 
 ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "docs" / "index.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
-BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 
 
 @pytest.mark.slow
@@ -24,8 +24,10 @@ def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monk
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").symlink_to(ROOT / "examples")  # pages are read in the repository
     names, ran = {}, 0
-    for kind, title, text in BLOCK.findall(page.read_text(encoding="utf-8")):
-        if title:
+    for info, text in fences(page):
+        kind, *settings = shlex.split(info) or [""]
+        if settings:
+            (title,) = (setting.removeprefix("title=") for setting in settings)
             (tmp_path / title).write_text(text, encoding="utf-8")
         elif kind == "python":
             exec(text, names)
@@ -36,9 +38,9 @@ def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monk
                 if arguments[0] == "train":
                     arguments += ["--iterations", "2"]
                 main(arguments)
-        else:
+        elif kind:
             pytest.fail(f"a block of {kind} is neither run nor written")
-        ran += 1
+        ran += bool(kind)
     assert ran >= 3
     if page.stem == "own-controller":
         assert "bound" in capsys.readouterr().out.split()
@@ -69,5 +71,34 @@ def test_pages_on_shifting_are_made_by_the_commands_that_stand_on_them():
     names = runpy.run_path(str(path))
     made = {page: ["identify", *arguments] for page, arguments in names["IDENTIFIED"].items()}
     for page, command in (made | names["STUDIED"]).items():
-        text = (ROOT / "docs" / "results" / "shifting" / page / "README.md").read_text("utf-8")
-        assert f"Made by `gaitshift {' '.join(command)} --out " in text, page
+        stands = codes(ROOT / "docs" / "results" / "shifting" / page / "README.md")
+        made_by = f"gaitshift {' '.join(command)} --out "
+        assert any(code.startswith(made_by) for code in stands), page
+
+
+@pytest.mark.parametrize(
+    "page",
+    [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))],
+    ids=lambda page: page.relative_to(ROOT).as_posix(),
+)
+def test_every_file_that_a_page_links_to_is_there(page):
+    assert {link for link in links(page) if not (page.parent / link).exists()} == set()
+
+
+def test_the_page_of_the_gaits_is_what_the_records_beside_the_policies_say():
+    names = runpy.run_path(str(ROOT / "tools" / "gait_results.py"))
+    assert names["PAGE"].read_text(encoding="utf-8") == names["page"]()
+
+
+def test_the_page_of_stairs_and_steps_has_the_figures_of_the_records():
+    names = runpy.run_path(str(ROOT / "tools" / "gait_results.py"))
+    for cells in rows(ROOT / "docs" / "results" / "edges.md"):
+        gait, *told = ("".join(token.content for token in cell) for cell in cells)
+        record = json.loads((names["POLICIES"] / f"{gait.replace('-', '_')}.json").read_text())
+        trials = {row["trial"]: row["value"] for row in record["evaluation"]["trials"]}
+        measured = [
+            trials[f"{figure} of 20 s, {ground}"]
+            for ground in ("stairs:0.05", "step:0.10")
+            for figure in ("survival", "distance_share")
+        ]
+        assert [float(text) for text in told] == pytest.approx(measured, abs=0.00051), gait

@@ -1,46 +1,46 @@
-"""What the README says in code is run, and what it says of the gaits is what was measured."""
+"""The README: its code is run, it lists every command, and it is short."""
 
-import json
-import re
 from pathlib import Path
 
 import pytest
 
-from gaitshift.control import policy
+from gaitshift.cli import main
+from pages import fences, items, rows
 
-README = Path(__file__).parent.parent / "README.md"
+ROOT = Path(__file__).parents[1]
+README, DESIGN = ROOT / "README.md", ROOT / "docs" / "design.md"
+
+LONGEST = 1200
+"""Words of the README."""
 
 
 def test_the_readmes_code_runs_and_its_condition_counts_nothing_on_level_feet():
-    (block,) = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    (block,) = (text for kind, text in fences(README) if kind == "python")
     names = {}
     exec(block, names)
     assert names["state"].k.tolist() == [0.0]
     assert names["fire"].tolist() == [False]
 
 
-def record(gait):
-    return json.loads((policy.load(gait).path.with_suffix(".json")).read_text())["evaluation"]
+def test_the_readme_is_short_and_its_one_table_leads_to_the_pages_that_answer():
+    assert len(README.read_text(encoding="utf-8").split()) < LONGEST
+    linked = [[token.attrGet("href") for token in row[0] if token.attrs] for row in rows(README)]
+    assert len(linked) == 8
+    assert all(len(links) == 1 and links[0].startswith("docs/results/") for links in linked)
 
 
-@pytest.mark.parametrize("gait", policy.shipped())
-def test_the_table_of_gaits_tells_what_the_records_of_the_policies_tell(gait):
-    text, flat = README.read_text(encoding="utf-8"), record(gait)["flat"]
-    (row,) = re.findall(rf"^\| {gait.replace('_', '-')} \| (.*) \|$", text, re.MULTILINE)
-    named, speed, cycles, pattern, touchdowns, cost = row.split(" | ")
-    assert named == f"{gait.replace('_', '-')}, clean"
-    assert flat["verdict"]["gait"] == gait
-    assert flat["verdict"]["clean"]
-    told = [speed.removesuffix(" m/s"), cycles.removesuffix(" Hz"), pattern, cost]
-    measured = [flat[n] for n in ("speed_mean", "cycles_per_s", "pattern_fraction")]
-    measured += [flat["cost_of_transport"], *flat["touchdowns_per_cycle"]]
-    assert [float(word) for word in (*told, *touchdowns.split())] == pytest.approx(
-        measured, abs=0.0051
-    )
+@pytest.fixture
+def commands(capsys):
+    """The names of the subcommands, as the program lists them."""
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    listed = capsys.readouterr().out.split("{")[1].split("}")[0]
+    return {name.strip() for name in listed.split(",")}
 
 
-def test_the_gaits_that_the_readme_says_went_through_all_trials_are_those_that_did():
-    text = " ".join(README.read_text(encoding="utf-8").split())
-    (names,) = re.findall(r"by their contacts \((.*?) `gaitshift evaluate GAIT --trials all`", text)
-    thorough = {gait for gait in policy.shipped() if record(gait)["command"].endswith(" all")}
-    assert set(re.split(", | and ", names.replace("-", "_"))) == thorough
+@pytest.mark.parametrize("page", [README, DESIGN], ids=lambda page: page.stem)
+def test_a_page_that_lists_commands_lists_all_of_them_and_no_other(page, commands):
+    heads = [cells[0] for cells in rows(page)] + items(page)
+    codes = [head[0].content for head in heads if head and head[0].type == "code_inline"]
+    listed = [code.split() for code in codes if code.startswith("gaitshift ")]
+    assert {words[1] for words in listed} == commands

@@ -5,8 +5,8 @@ Usage: python tools/shifting_evidence.py [PAGE...]
 Each page by the commands that stand on it, all if none is named; the logs that they need are
 recorded first. It takes four to five hours on two cores. Broken off, the same command goes on where
 it stopped (runs/shifting, 4 GB; remove it after policies have changed). Large ones of `identify`'s
-pages to hover over are left out. The texts of docs/results/shifting/index.md and the README are
-written by hand.
+pages to hover over are left out. The pages docs/results/shifting/*.md are written by hand, but for
+trained-on-shifts.md.
 """
 
 import argparse

@@ -16,15 +16,17 @@ def tables_in(path: Path) -> dict[str, object]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        raise GaitshiftError("there is no such file") from None
+        raise GaitshiftError("no such file") from None
     except OSError as error:
         raise GaitshiftError(f"the file cannot be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise GaitshiftError("this is not a TOML file: it is not UTF-8 text") from None
+        raise GaitshiftError(
+            "the file must be TOML in UTF-8, got bytes that are not UTF-8"
+        ) from None
     try:
         tables = tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        raise GaitshiftError(f"this is not a TOML file: {error}") from None
+        raise GaitshiftError(f"the file is not valid TOML: {error}") from None
     if not tables:
         raise GaitshiftError("the file is empty")
     return tables
@@ -43,7 +45,7 @@ def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
     """Say in one line what is unknown, what may have been meant and what is known."""
     close = get_close_matches(name, known, n=1)
     meant = f" did you mean {close[0]!r}?" if close else ""
-    return f"unknown {kind} {name!r};{meant} {kind}s are {', '.join(known)}"
+    return f"unknown {kind} {name!r};{meant} known {kind}s: {', '.join(known)}"
 
 
 class Table:
@@ -55,7 +57,7 @@ class Table:
 
     def __init__(self, data: object, *, keys: tuple[str, ...]):
         if not isinstance(data, dict):
-            raise GaitshiftError(f"must be a table of keys and values, not {shortened(data)}")
+            raise GaitshiftError(f"must be a table of keys and values, got {shortened(data)}")
         self._values = cast(dict[str, object], data)
         for key in self._values:
             if key not in keys:
@@ -100,7 +102,7 @@ class Table:
         try:
             return float(value)
         except OverflowError:
-            raise _wrong(key, "a number of a usual size", value) from None
+            raise _wrong(key, "a number of at most 1e308", value) from None
 
     def pair(self, key: str, *, default: tuple[float, float]) -> tuple[float, float]:
         """Return two numbers, the lower and the upper end of a range."""
@@ -125,7 +127,7 @@ class Table:
             if not isinstance(name, str):
                 raise _wrong(key, 'a list of feet, such as ["FL", "BR"]', names)
             if names.count(name) > 1:
-                raise GaitshiftError(f"{key!r} names {name} twice")
+                raise GaitshiftError(f"{key!r} must name each foot once, got {name} twice")
         return frozenset(cast(list[str], names))
 
     def table(self, key: str) -> dict[str, object]:
@@ -156,7 +158,7 @@ class Table:
         try:
             return [float(value) for value in cast(list[float], values)]
         except OverflowError:
-            raise _wrong(key, "two numbers of a usual size", values) from None
+            raise _wrong(key, "numbers of at most 1e308", values) from None
 
     def _list(self, key: str, wanted: str) -> list[object]:
         value = self.get(key)
@@ -166,4 +168,4 @@ class Table:
 
 
 def _wrong(key: str, wanted: str, value: object) -> GaitshiftError:
-    return GaitshiftError(f"{key!r} must be {wanted}, not {shortened(value)}")
+    return GaitshiftError(f"{key!r} must be {wanted}, got {shortened(value)}")

@@ -2,7 +2,7 @@
 
 
 class GaitshiftError(Exception):
-    """Something the user gave is wrong; the message says what, where, and what would be right.
+    """An input is wrong; the message names the setting or file, what is allowed and what it got.
 
     The command line prints the message as one line and ends with exit code 2.
     """

@@ -58,11 +58,13 @@ def read_typed(path: Path, columns: Columns, what: str) -> list[Row]:
         return []
     names, rows = _read(path)
     if names != tuple(columns) or not all(map(_is_whole, rows)):
-        raise GaitshiftError(f"{path} is no table of {what}; give another --out, or --overwrite")
+        raise GaitshiftError(f"{path} is not a table of {what}; give another --out, or --overwrite")
     try:
         return [{n: kind(row[n]) if row[n] else "" for n, kind in columns.items()} for row in rows]
     except ValueError as error:
-        raise GaitshiftError(f"{path}: {error}") from error
+        raise GaitshiftError(
+            f"{path} is damaged: {error}; give another --out, or --overwrite"
+        ) from error
 
 
 def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = None) -> None:
@@ -127,7 +129,7 @@ def stream(
                 for batch in file:
                     yield _arrays(path, batch, known)
     except UnicodeError as error:
-        raise GaitshiftError(f"{path} is not written in UTF-8: {error}") from error
+        raise GaitshiftError(f"{path} must be in UTF-8: {error}") from error
     except (arrow.ArrowException, OSError) as error:
         line = (str(error).splitlines() or [type(error).__name__])[0]
         raise GaitshiftError(f"{path} cannot be read as {path.suffix[1:]}: {line}") from error
@@ -176,5 +178,5 @@ def _arrays(path: Path, batch: Any, known: Collection[str]) -> dict[str, np.ndar
         try:
             arrays[name] = column.cast("float64", safe=False).to_numpy(zero_copy_only=False)
         except Exception as error:  # arrow has an error for each type
-            raise GaitshiftError(f"{path}: column '{name}' does not hold numbers") from error
+            raise GaitshiftError(f"{path}: column '{name}' must hold numbers") from error
     return arrays

@@ -423,7 +423,7 @@ def test_a_stance_is_shown_where_the_feet_are_one_of_the_present_gaits(policies)
 
 
 def test_a_driver_without_the_gait_to_start_in_is_refused(policies):
-    with pytest.raises(GaitshiftError, match="'canter'; known: trot, bound, pace"):
+    with pytest.raises(GaitshiftError, match="trot, bound, pace, got 'canter'"):
         Driver(policies, 1, start="canter")
 
 
@@ -495,7 +495,7 @@ def test_a_shift_begins_the_new_machine_anew(policies):
 
 
 def test_one_gait_for_flat_and_rough_is_refused():
-    with pytest.raises(GaitshiftError, match="are both 'trot'"):
+    with pytest.raises(GaitshiftError, match="must differ, got 'trot'"):
         GaitGraph.of(CONDITION, flat="trot", rough="trot")
 
 
@@ -567,7 +567,7 @@ def test_only_numbers_of_a_graph_can_be_retuned(policies):
         GaitGraph.of(Condition(), flat="trot", rough="pace"),
         GaitGraph.of(Condition.paper(), flat="trot", rough="bound"),
     ):
-        with pytest.raises(GaitshiftError, match="same edges and statistics"):
+        with pytest.raises(GaitshiftError, match="cannot change its edges or statistics"):
             switcher.retune(other)
 
 

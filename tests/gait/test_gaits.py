@@ -206,14 +206,14 @@ def test_a_file_with_windows_line_ends_and_a_byte_order_mark_loads(tmp_path):
     [
         (
             "trott",
-            r"unknown gait 'trott'; did you mean 'trot'\? gaits are bound, gallop, half_bound,"
-            " pace, pronk, three_one, trot, walk; for a file of your own",
+            r"unknown gait 'trott'; did you mean 'trot'\? known gaits: bound, gallop, half_bound,"
+            " pace, pronk, three_one, trot, walk; or give the path of a .toml file",
         ),
-        ("canter", "unknown gait 'canter'; gaits are bound, gallop"),
-        ("", "unknown gait ''; gaits are"),
+        ("canter", "unknown gait 'canter'; known gaits: bound, gallop"),
+        ("", "unknown gait ''; known gaits: "),
         ("../gaits/trot", "unknown gait"),
-        ("no/such.toml", "no/such.toml: there is no such file"),
-        (Path("trot"), "trot: there is no such file"),
+        ("no/such.toml", "no/such.toml: no such file"),
+        (Path("trot"), "trot: no such file"),
     ],
 )
 def test_an_unknown_gait_is_refused_with_those_there_are(name, message):

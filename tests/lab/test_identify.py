@@ -270,13 +270,16 @@ def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
         ([], "record"),
         (["nowhere.npz"], "no log file nowhere.npz"),
         (["README.md"], ".npz"),
-        (["{log}", "--condition", "guess"], "no condition 'guess'"),
-        (["{log}", "--condition", "slip"], "lack the signals"),
-        (["{smooth}"], "no rough ground"),
+        (["{log}", "--condition", "guess"], "got 'guess'"),
+        (["{log}", "--condition", "slip"], "lack signals"),
+        (["{smooth}"], "must contain rough ground"),
         (["{log}", "--alpha", "0.2"], "--beta"),
         (["{log}", "--leak", "1"], "--alpha and --beta"),
-        (["{log}", "--alpha", "-1", "--beta", "3"], "alpha must be positive"),
-        (["{log}", "--alpha", "1", "--beta", "3", "--condition", "all"], "another unit"),
+        (["{log}", "--alpha", "-1", "--beta", "3"], "alpha must be above 0"),
+        (
+            ["{log}", "--alpha", "1", "--beta", "3", "--condition", "all"],
+            "--alpha must be given with named",
+        ),
     ],
 )
 def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
@@ -340,7 +343,7 @@ def test_a_run_that_was_killed_goes_on_where_it_stopped(
     capsys.readouterr()
     identify(two_logs, out)
     assert [*done, *after] == ["walk-0", "walk-1", "walk-0", "walk-1"], "chosen by, then judged by"
-    assert "choosing: walk-0 (kept)" in capsys.readouterr().err
+    assert "choosing: walk-0 (cached)" in capsys.readouterr().err
     assert report_in(out) == report_in(whole)
     assert not (out / "unfinished").exists()
 
@@ -393,7 +396,7 @@ def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys
     assert [row["robots"] for row in rows] == [8, 8]
     before = [path.stat().st_mtime_ns for path in sorted(logs.iterdir())]
     main(command)
-    assert "kept" in capsys.readouterr().err
+    assert "cached" in capsys.readouterr().err
     assert [path.stat().st_mtime_ns for path in sorted(logs.iterdir())] == before
     files = [str(path) for path in sorted(logs.iterdir())]
     main(["identify", *files, "--out", str(tmp_path / "report"), "--json"])
@@ -405,7 +408,11 @@ def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [([], "trot"), (["trot", "--courses", "moon"], "no course 'moon'"), (["moon"], "no policy")],
+    [
+        ([], "trot"),
+        (["trot", "--courses", "moon"], "got 'moon'"),
+        (["moon"], "policy must be one of"),
+    ],
 )
 def test_bad_input_of_record_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
     with pytest.raises(SystemExit) as end:
@@ -443,7 +450,7 @@ def test_a_classifier_learns_what_rough_ground_is():
 @pytest.mark.parametrize(("rough", "says"), [(True, "rough"), (False, "smooth")])
 def test_a_classifier_needs_both_labels(rough, says):
     one_kind = march("flat", noise=0.0)
-    with pytest.raises(GaitshiftError, match=f"all labels are {says}"):
+    with pytest.raises(GaitshiftError, match=f"got {says} only"):
         RoughnessClassifier.fit([replace(one_kind, rough=np.full_like(one_kind.rough, rough))])
 
 
@@ -454,7 +461,7 @@ def test_of_all_conditions_the_classifier_is_left_out_where_one_robot_is_all_the
     out = ["--out", str(tmp_path / "report"), "--json"]
     main(["identify", str(log), "--condition", "all", *out])
     said = capsys.readouterr()
-    assert "left out" in said.err
+    assert "skipped" in said.err
     assert "classifier" not in {row["condition"] for row in json.loads(said.out)["conditions"]}
     with pytest.raises(SystemExit) as end:
         main(["identify", str(log), "--condition", "classifier", "--overwrite", *out])

@@ -40,7 +40,7 @@ def test_a_kept_log_of_other_size_is_refused_before_anything_is_recorded(
 ):
     logs = shutil.copytree(recorded, tmp_path / "logs")
     line = refused(capsys, ask(logs, robots, seconds, courses=("up-10", "flat")))
-    assert f"{logs / 'trot-flat-0.npz'} is there already and holds 2 robots × 0.3 s" in line
+    assert f"{logs / 'trot-flat-0.npz'} has 2 robots × 0.3 s" in line
     assert f"not {robots} × {seconds:g} s" in line
     assert "--overwrite" in line
     assert [path.name for path in logs.iterdir()] == ["trot-flat-0.npz"]
@@ -56,18 +56,18 @@ def test_a_log_that_ended_as_all_robots_had_fallen_is_kept(recorded, tmp_path, c
     replace(log, fallen=fallen).save(path)
     before = path.read_bytes()
     main(ask(path.parent, 2, 8))
-    assert "kept" in capsys.readouterr().err
+    assert "not recorded again" in capsys.readouterr().err
     assert path.read_bytes() == before
 
 
 def test_two_policies_of_one_gait_are_refused(tmp_path, capsys):
     mine = shutil.copy(TROT, tmp_path / "mine.onnx")
     line = refused(capsys, ask(tmp_path / "logs", 2, 0.3, str(mine)))
-    assert "two of the policies are of the gait 'trot'" in line
+    assert "got two of 'trot'" in line
     assert "--out" in line
     assert not (tmp_path / "logs").exists()
 
 
 def test_a_length_that_is_none_is_refused_before_anything_is_recorded(tmp_path, capsys):
-    assert "more than 0, up to 3600" in refused(capsys, ask(tmp_path / "logs", 2, "nan"))
+    assert "above 0 and at most 3600" in refused(capsys, ask(tmp_path / "logs", 2, "nan"))
     assert not (tmp_path / "logs").exists()

@@ -109,7 +109,7 @@ def test_a_plan_is_all_settings_gaits_and_seeds_and_parts_can_be_picked():
         *(f"paper-gains-trot-{s}" for s in (4, 5, 6)),
     ]
     assert plan.select(("bonus",)) == plan.select(("multiply", "multiply-clipped"))
-    with pytest.raises(GaitshiftError, match="nothing called 'canter'; known: paper, trot"):
+    with pytest.raises(GaitshiftError, match=r"paper, trot.*got 'canter'"):
         plan.select(("canter",))
 
 
@@ -326,7 +326,7 @@ def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
     ("name", "old", "new", "says"),
     [
         ("runs.csv", "setting,", "set,", "runs.csv is damaged: 'setting'"),
-        ("curves.csv", "blind,trot,0,7,", "blind,trot,9,7,", "200 lines of blind-trot-0"),
+        ("curves.csv", "blind,trot,0,7,", "blind,trot,9,7,", "must have 200 lines of blind-trot-0"),
         ("curves.csv", "26.00", "2_6.0?", "curves.csv is damaged: could not convert"),
     ],
 )
@@ -437,7 +437,7 @@ def test_a_run_that_breaks_down_in_its_numbers_is_a_finding(part, tmp_path, monk
     train(job, tmp_path / job.name)
     assert is_over(job, tmp_path / job.name)
     text = (tmp_path / job.name / FAILED).read_text()
-    assert text.startswith("the training broke down: ")
+    assert text.startswith("training diverged: ")
     assert text.count("\n") == 1
     results = Results.read(Plan.tiny(), tmp_path)
     assert results.seeds["multiply", "trot"].broken == (True,)
@@ -450,11 +450,13 @@ def test_weights_that_are_no_numbers_are_told_before_anybody_acts_on_them(tmp_pa
     run = Run.create(tmp_path / "run", job.machine, job.recipe, seed=0, command="test")
     with torch.no_grad():
         run.learner.ppo.actor.mlp[0].weight[3, 1] = torch.nan
-    with pytest.raises(DivergedError, match="broke down: an action is not a number"):
+    with pytest.raises(DivergedError, match="training diverged: an action is not a number"):
         run.iterate()
     with torch.no_grad():
         run.learner.ppo.actor.distribution.std_param[2] = torch.nan
-    with pytest.raises(DivergedError, match=r"broke down: distribution\.std_param of the actor"):
+    with pytest.raises(
+        DivergedError, match=r"training diverged: distribution\.std_param of the actor"
+    ):
         run.iterate()
 
 
@@ -543,12 +545,12 @@ def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--only", "canter"], "nothing called 'canter'"),
-        (["--jobs", "0"], "jobs = 0: 1 to 1024"),
-        (["--seed", "-1"], "seed -1"),
-        (["--out", "file"], "file is a file"),
-        (["--out", "file/x/y"], "file is a file"),
-        (["--runs", "file/x"], "file is a file"),
+        (["--only", "canter"], "got 'canter'"),
+        (["--jobs", "0"], "jobs must be 1 to 1024, got 0"),
+        (["--seed", "-1"], "seed must be 0 or larger, got -1"),
+        (["--out", "file"], "must be a folder, got the file file"),
+        (["--out", "file/x/y"], "must be a folder, got the file file"),
+        (["--runs", "file/x"], "must be a folder, got the file file"),
     ],
 )
 def test_a_fault_of_the_user_is_one_line(arguments, says, tmp_path, monkeypatch, capsys):

@@ -51,7 +51,7 @@ def test_a_killed_call_and_the_next_one_do_each_part_once_and_write_the_same_fil
     first, _ = run(path, killed_at=killed_at)
     second, said = run(path)
     assert first + second == KEYS
-    assert said == [f"{gait} on {ground} is there already, and kept" for gait, ground in first]
+    assert said == [f"{gait} on {ground} exists, not repeated" for gait, ground in first]
     assert path.read_bytes() == (tmp_path / "whole" / "falls.csv").read_bytes()
 
 
@@ -80,7 +80,7 @@ def test_rows_of_another_measurement_are_refused_unless_it_begins_anew(tmp_path)
     path = tmp_path / "falls.csv"
     run(path)
     before = path.read_bytes()
-    with pytest.raises(GaitshiftError, match="falls with seed = 0, not 3"):
+    with pytest.raises(GaitshiftError, match=r"seed must be 0 to add to .*, got 3"):
         opened(path, same={"seed": 3})
     assert path.read_bytes() == before
     assert len(opened(path).rows) == len(KEYS)

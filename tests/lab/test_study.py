@@ -121,13 +121,13 @@ def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
     table.write_text("".join(whole.splitlines(keepends=True)[:4]))  # killed before the last way
     main(command)
     said = capsys.readouterr().err
-    assert "trot only over 0.05 m is there already" in said
+    assert "trot only at 0.05 m exists" in said
     assert "oracle over" not in said
     assert table.read_text() == whole
     with pytest.raises(SystemExit) as end:
         main([*command, "--seed", "3"])
     assert end.value.code == 2
-    assert "crossings with seed = 0, not 3" in capsys.readouterr().err.splitlines()[-1]
+    assert "seed must be 0 to add to" in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_the_figure_shows_every_way_with_its_survival(tmp_path):
@@ -147,12 +147,12 @@ def test_the_figure_shows_every_way_with_its_survival(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--runs", "1"], "1 runs"),
-        (["--amplitudes", "2"], "amplitude of 2 m"),
+        (["--runs", "1"], "runs must be 2 to 1000000, got 1"),
+        (["--amplitudes", "2"], "amplitudes must be 0 to 1 m, got 2"),
         (["--conditions", "luck"], "luck"),
-        (["--rough-gait", "trot"], "both 'trot'"),
+        (["--rough-gait", "trot"], "must differ, got 'trot'"),
         (["--rough-gait", "canter"], "canter"),
-        (["--seed", "-1"], "seed -1"),
+        (["--seed", "-1"], "seed must be 0 or larger, got -1"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(tmp_path, capsys, arguments, message):

@@ -141,14 +141,14 @@ def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
     table.write_text("".join(whole.splitlines(keepends=True)[:2]))  # killed after the first pair
     main(command)
     said = capsys.readouterr()
-    assert "trot to pace on flat is there already" in said.err
+    assert "trot to pace on flat exists" in said.err
     assert "pace to trot" not in said.err
     assert table.read_text() == whole
     with pytest.raises(SystemExit) as end:  # or the totals would be of two measurements
         main([part if part != "8" else "9" for part in command])
     assert end.value.code == 2
     said = capsys.readouterr().err.splitlines()[-1]
-    assert f"{table} has shifts with switches = 8, not 9" in said
+    assert f"switches must be 8 to add to {table}, got 9" in said
     assert table.read_text() == whole
 
 
@@ -157,7 +157,7 @@ def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
     [
         (["trot"], "two gaits"),
         (["trot", "canter"], "canter"),
-        (["trot", "pace", "--switches", "0"], "0 switches"),
+        (["trot", "pace", "--switches", "0"], "switches must be 1 to 1000000, got 0"),
         (["trot", "trot"], "two gaits"),
         (["trot", "pace", "--grounds", "flat", "lava"], "lava"),
     ],
@@ -175,7 +175,7 @@ def test_a_table_that_is_none_is_refused(tmp_path, capsys):
     with pytest.raises(SystemExit) as end:
         main(["transitions", "trot", "pace", "--out", str(tmp_path)])
     assert end.value.code == 2
-    assert "is no table of shifts" in capsys.readouterr().err
+    assert "is not a table of shifts" in capsys.readouterr().err
 
 
 def test_the_map_shades_failures_and_counts_them(tmp_path):

@@ -201,8 +201,8 @@ def test_recipes_that_cannot_be_run_are_refused(faulty):
     [
         ({"settle": 1.5}, "0 to 1"),
         ({"averaged": -0.1}, "0 to 1"),
-        ({"trace_factor": 0.0}, "more than 0"),
-        ({"horizon_factor": -1.0}, "more than 0"),
+        ({"trace_factor": 0.0}, "above 0"),
+        ({"horizon_factor": -1.0}, "above 0"),
         ({"fields": ("flat", "moon")}, "flat, perlin, slope, stair, step"),
         ({"fields": ()}, "flat, perlin, slope, stair, step"),
     ],
@@ -235,7 +235,7 @@ def test_a_recipe_that_repeats_a_stage_is_cut_in_order_too():
 
 
 def test_no_iterations_are_too_few():
-    with pytest.raises(GaitshiftError, match="0 iterations: at least 1"):
+    with pytest.raises(GaitshiftError, match="iterations must be 1 or more, got 0"):
         ABC.with_iterations(0)
 
 
@@ -668,7 +668,7 @@ def test_a_folder_with_something_in_it_is_refused_and_left_alone(tmp_path):
     (tmp_path / "thesis.txt").write_text("years of work")
     with pytest.raises(GaitshiftError, match="not empty; give another --out, --overwrite"):
         create(tmp_path)
-    with pytest.raises(GaitshiftError, match="not a training run, so it is not overwritten"):
+    with pytest.raises(GaitshiftError, match="not a training run and is not overwritten"):
         create(tmp_path, overwrite=True)
     assert [file.name for file in tmp_path.iterdir()] == ["thesis.txt"]
 

@@ -357,15 +357,19 @@ def test_knees_stop_before_the_leg_is_straight(leg):
 def test_unknown_gains_are_refused_and_the_known_ones_named():
     with pytest.raises(GaitshiftError) as error:
         ANYMAL_B.gains_of("stiff")
-    assert str(error.value) == "robot anymal_b has no gains 'stiff'; known: default, paper"
+    assert str(error.value) == "robot anymal_b: gains must be one of default, paper, got 'stiff'"
 
 
 @pytest.mark.parametrize("length", [0, 11, 13])
 def test_a_stance_of_another_length_is_refused(length):
-    with pytest.raises(GaitshiftError, match=r"^robot anymal_b: a stance has 12 joint angles$"):
+    with pytest.raises(
+        GaitshiftError, match=r"^robot anymal_b: stance must have 12 joint angles, got \d+$"
+    ):
         replace(ANYMAL_B, stance=(0.1,) * length)
 
 
 def test_gains_without_a_default_are_refused():
-    with pytest.raises(GaitshiftError, match=r"^robot anymal_b: gains need .* named 'default'$"):
+    with pytest.raises(
+        GaitshiftError, match=r"^robot anymal_b: gains must have a preset 'default'"
+    ):
         replace(ANYMAL_B, gains={"paper": Gains(kp=3.0, kd=0.2)})

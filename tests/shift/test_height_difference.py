@@ -279,12 +279,14 @@ def test_height_that_is_not_a_number_counts_for_neither_rule_until_the_foot_touc
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"alpha": 0.0}, "the way to the rough gait: alpha must be positive and finite, not 0.0"),
-        ({"beta": -1.0}, "the way to the rough gait: beta must be 0 or more and finite, not -1.0"),
-        ({"epsilon": math.inf}, "the way to the rough gait: epsilon must be positive and finite, "
-                                "not inf"),
-        ({"alpha_back": math.nan}, "the way back: alpha must be positive and finite, not nan"),
-        ({"leak_back": -0.1}, "the way back: leak must be 0 or more and finite, not -0.1"),
+        ({"alpha": 0.0}, "shift to the rough gait: alpha must be above 0 and finite, got 0.0"),
+        ({"beta": -1.0}, "shift to the rough gait: beta must be 0 or more and finite, got -1.0"),
+        ({"epsilon": math.inf}, "shift to the rough gait: epsilon must be above 0 and finite, "
+                                "got inf"),
+        ({"alpha_back": math.nan}, "shift back to the flat gait: alpha must be above 0 and finite, "
+                                    "got nan"),
+        ({"leak_back": -0.1}, "shift back to the flat gait: leak must be 0 or more and finite, "
+                               "got -0.1"),
     ],
 )  # fmt: skip
 def test_bad_config_is_refused_with_one_line_that_says_what_would_be_right(wrong, message):
@@ -300,7 +302,7 @@ def test_unknown_frame_is_refused_with_the_known_ones():
         condition.__post_init__()
     with pytest.raises(GaitshiftError) as of_height:
         height_in_frame(np.zeros((1, 4, 3)), DOWN[None], "world")
-    message = "unknown frame 'world'; known frames: body, gravity"
+    message = "frame must be body or gravity, got 'world'"
     assert str(of_config.value) == str(of_height.value) == message
 
 

@@ -211,11 +211,11 @@ def test_contact_diagram_shows_the_window_alone(tmp_path):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda folder: demo_figure(LOG, folder / "a.png", robot=2), "robot 2"),
-        (lambda folder: demo_figure(LOG, folder / "a.gif"), "ends in .png"),
+        (lambda folder: demo_figure(LOG, folder / "a.png", robot=2), "got 2"),
+        (lambda folder: demo_figure(LOG, folder / "a.gif"), "must end in .png"),
         (lambda folder: demo_figure(LOG, folder / "no" / "a.png"), "no folder"),
-        (lambda folder: demo_figure(first_entries(1), folder / "a.png"), "1 control steps"),
-        (lambda folder: contact_diagram(LOG, folder / "a.png", t0=9.0), "from 1 to 2.99 s"),
+        (lambda folder: demo_figure(first_entries(1), folder / "a.png"), "got 1"),
+        (lambda folder: contact_diagram(LOG, folder / "a.png", t0=9.0), "within 1 to 2.99 s"),
     ],
 )
 def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path, call, words):
@@ -295,9 +295,12 @@ def test_training_curves_tell_stages_units_and_wall_time(progress, tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "0 iterations"),
+        ("", "2 iterations or more to draw, got 0"),
         ("iteration,stage\n1,flat\n2,flat\n", "lacks 'steps'"),
-        ("iteration,stage,steps,wall_s,reward,speed,survival,changes_per_s\n" * 3, "'steps' holds"),
+        (
+            "iteration,stage,steps,wall_s,reward,speed,survival,changes_per_s\n" * 3,
+            "'steps' must hold numbers",
+        ),
     ],
 )
 def test_a_file_that_is_no_progress_is_refused(tmp_path, text, words):

@@ -125,7 +125,7 @@ def test_a_film_stands_on_the_page_under_a_heading_as_all_sections_do(log, tmp_p
     (tmp_path / "film.mp4").write_bytes(b"a film")
     write_report(log, tmp_path / "page.html", video=tmp_path / "film.mp4")
     text = (tmp_path / "page.html").read_text()
-    assert re.findall("<h2>(.*?)</h2>", text) == ["Gaits", "Shifts", "Film", "What made it"]
+    assert re.findall("<h2>(.*?)</h2>", text) == ["Gaits", "Shifts", "Film", "Settings"]
     assert base64.b64encode(b"a film").decode() in text
 
 
@@ -157,10 +157,10 @@ def test_report_writes_a_page_beside_the_log_and_replaces_none_unasked(log, tmp_
     ("arguments", "message"),
     [
         (["nowhere.npz"], "no log file nowhere.npz"),
-        (["{log}", "--robot", "7"], "robot 7 is not in the log"),
-        (["{log}", "--video", "no.mp4"], "no video no.mp4"),
+        (["{log}", "--robot", "7"], "got 7"),
+        (["{log}", "--video", "no.mp4"], "no video file no.mp4"),
         (["{log}", "--out", "no/where.html"], "no folder no"),
-        (["README.md"], "not a whole npz file"),
+        (["README.md"], "not a complete npz file"),
     ],
 )
 def test_bad_input_of_report_is_one_line_and_code_2(log, tmp_path, capsys, arguments, message):

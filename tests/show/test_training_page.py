@@ -78,7 +78,7 @@ def test_the_run_is_as_it_was(run, page):
 @pytest.mark.parametrize(
     ("file", "content", "message"),
     [
-        ("policy.onnx", None, "holds no policy.onnx"),
+        ("policy.onnx", None, "without policy.onnx"),
         ("progress.csv", None, "progress.csv cannot be read"),
         ("progress.csv", "a,b\n1,2\n3,4\n", "it lacks 'iteration'"),
         ("config.json", "{", "config.json"),

@@ -274,18 +274,24 @@ def test_a_video_is_written_whole_or_not_at_all(tmp_path):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda folder: render(slide(), folder / "a.avi"), "ends in .mp4"),
+        (lambda folder: render(slide(), folder / "a.avi"), "must end in .mp4"),
         (lambda folder: render(slide(), folder / "no" / "a.mp4"), "no folder"),
-        (lambda folder: render(slide(), folder / "a.mp4", robot=1), "robot 1 is not in the log"),
-        (lambda folder: render(slide(), folder / "a.mp4", t0=5.0), "nothing to show from 5"),
-        (lambda folder: render(slide(), folder / "a.mp4", width=321), "even numbers"),
+        (lambda folder: render(slide(), folder / "a.mp4", robot=1), "got 1"),
+        (lambda folder: render(slide(), folder / "a.mp4", t0=5.0), "got 5"),
+        (
+            lambda folder: render(slide(), folder / "a.mp4", width=321),
+            "width and height must be even",
+        ),
         (lambda folder: render(slide(), folder / "a.mp4", fps=0), "1 to 120"),
-        (lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"), "of a 'dog'"),
-        (lambda folder: render(elsewhere(), folder / "a.mp4"), "a ground of its own"),
+        (lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"), "got 'dog'"),
+        (lambda folder: render(elsewhere(), folder / "a.mp4"), "robot must be 0"),
         (lambda folder: contact_sheet(folder / "no.mp4", folder / "a.png"), "no video"),
-        (lambda folder: contact_sheet([], folder / "a.png"), "no pictures"),
-        (lambda folder: contact_sheet(colours(1), folder / "a.png", count=0), "at least 1"),
-        (lambda folder: contact_sheet(no_video(folder), folder / "a.png"), "is no video"),
+        (lambda folder: contact_sheet([], folder / "a.png"), "at least one picture"),
+        (
+            lambda folder: contact_sheet(colours(1), folder / "a.png", count=0),
+            "count must be 1 or more, got 0",
+        ),
+        (lambda folder: contact_sheet(no_video(folder), folder / "a.png"), "must be a video"),
     ],
 )
 def test_what_cannot_be_filmed_is_said_in_one_line(tmp_path, call, words):

@@ -465,7 +465,7 @@ def test_a_target_that_is_no_number_is_refused_and_nothing_moves(value):
     with pytest.raises(GaitshiftError) as error:
         world.step(bad)
     assert str(error.value) == (
-        "joint target of robot 2, BL_HFE, is not a number; nothing was moved"
+        "joint targets must be numbers, got NaN or infinity for BL_HFE of robot 2"
     )
     np.testing.assert_array_equal(before[0], world.state()[0])
     np.testing.assert_array_equal(before[1], world.state()[1])
@@ -474,7 +474,7 @@ def test_a_target_that_is_no_number_is_refused_and_nothing_moves(value):
 
 
 def test_a_world_without_robots_is_refused():
-    with pytest.raises(GaitshiftError, match=r"^0 robots: at least 1 would be right$"):
+    with pytest.raises(GaitshiftError, match="robots must be 1 or more, got 0"):
         World(ANYMAL_B, LEVEL, 0)
 
 

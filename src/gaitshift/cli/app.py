@@ -84,8 +84,8 @@ def _parse(arguments: list[str] | None) -> Command:
                 Command,  # pyright: ignore[reportArgumentType]  (a union of annotated types)
                 prog="gaitshift",
                 description=(
-                    "Quadruped gaits as reward machines, trained in minutes on a CPU, and shifted "
-                    "by the robot itself."
+                    "Train quadruped gaits described by reward machines, and let the robot shift "
+                    "between them by itself."
                 ),
                 args=arguments,
                 config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
@@ -100,4 +100,4 @@ def _first_part(box: str) -> str:
     """What a box of tyro's says above its first rule, as one line."""
     lines = [line.strip("│ ") for line in box.splitlines()[1:]]
     rule = next((i for i, line in enumerate(lines) if line.startswith(("─", "╰"))), len(lines))
-    return f"{' '.join(line for line in lines[:rule] if line)}; --help tells more"
+    return f"{' '.join(line for line in lines[:rule] if line)}; see --help"

@@ -32,21 +32,21 @@ class TimeToGaitOptions:
     """For `bench time-to-gait`."""
 
     gaits: tuple[str, ...] | None = None
-    """Which; trot, pace and bound, with --quick trot."""
+    """Gaits to train; by default trot, pace and bound, with --quick trot."""
     seeds: int | None = None
-    """Seeds that each gait is trained from; 3, with --quick 1."""
+    """Number of seeds for each gait; by default 3, with --quick 1."""
     first_seed: int | None = None
-    """The first of them; 0."""
+    """First seed; 0 by default."""
     baseline_budget: float | None = None
-    """Training time after which a baseline is given up [s]; 600, with --quick 1; 0: no baseline."""
+    """Longest training time of the baseline [s]; by default 600, with --quick 1; 0: no baseline."""
     quick: bool = False
-    """Seconds of trot on few robots: shows that all of it works, not how fast it is."""
+    """Train trot for seconds on few robots: a test run, not a measurement."""
     out: Path | None = None
-    """Folder for time_to_gait.csv and time_to_gait.png; trainings that the table has already are
-    kept, so that a command that was broken off goes on. Those of another recipe stay in the table
-    and are measured anew."""
+    """Folder for time_to_gait.csv and time_to_gait.png. Trainings that the table already has are
+    not repeated, so an interrupted command resumes. Trainings of another recipe stay in the table
+    and are measured again."""
     overwrite: bool = False
-    """Begin anew where there are results already."""
+    """Discard earlier results in the folder."""
 
     def config(self) -> "TimeToGait":
         """The measurement asked for."""
@@ -62,15 +62,15 @@ class TimeToGaitOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Bench:
-    """Measure how fast it is.
+    """Measure speed.
 
-    speed: steps a second of the environment, beside bare physics in the same run, and of training.
+    speed: steps per second of the environment, of bare physics in the same run, and of training.
 
     time-to-gait: training until trot, pace and bound first pass a check on flat ground, with
-    survival ≥ 0.99, speed within 0.1 m/s and pattern fraction ≥ 0.6, beside stable-baselines3's PPO
-    at its defaults with 30 robots; hours, most of them the baseline's.
+    survival ≥ 0.99, speed within 0.1 m/s and pattern fraction ≥ 0.6, compared with PPO of
+    stable-baselines3 at its defaults with 30 robots. Takes hours, most of them for the baseline.
 
-    page: whether the page of `gaitshift view` keeps real time on one core, drawing 50 times a
+    page: whether the page of `gaitshift view` runs in real time on one core at 50 frames per
     second.
 
     replay: how long `identify` takes for 1000 episodes of 20 s, 100 α and 1000 β.
@@ -85,7 +85,7 @@ class Bench:
     time_to_gait: TimeToGaitOptions = field(default_factory=TimeToGaitOptions)
     """For `bench time-to-gait`."""
     page_seconds: float = 20.0
-    """For `bench page`: time that each page runs [s]."""
+    """For `bench page`: duration of each run [s]."""
     json: bool = False
     """One JSON object on stdout."""
 

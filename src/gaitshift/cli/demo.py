@@ -27,7 +27,9 @@ def _split_numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in _split(text))
     except ValueError:
-        raise GaitshiftError(f"times '{text}': numbers with commas between, like 2,5,8") from None
+        raise GaitshiftError(
+            f"at must be numbers separated by commas, such as 2,5,8, got '{text}'"
+        ) from None
 
 
 names_option = tyro.constructors.PrimitiveConstructorSpec[tuple[str, ...]](
@@ -48,18 +50,18 @@ _numbers = tyro.constructors.PrimitiveConstructorSpec[tuple[float, ...]](
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(DemoConfig):
-    """Watch a robot cross flat and rough ground and shift its gait by itself."""
+    """Simulate a robot that crosses flat and rough ground and shifts its gait by itself."""
 
     gaits: Annotated[tuple[str, ...], names_option] = ()
-    """Gaits to show in a row instead, on a schedule and without the condition, such as
+    """Gaits to show in sequence on a schedule, in place of the condition, such as
     trot,bound,pace,trot."""
     at: Annotated[tuple[float, ...], _numbers] = ()
-    """Times of the shifts to the second of these gaits and on [s], such as 2,5,8; else every
-    `every` seconds."""
+    """Times of the shifts between these gaits [s], such as 2,5,8; by default every `every`
+    seconds."""
     out: Path = Path("gaitshift-demo")
     """Folder for index.html, demo.mp4, demo.png, log.npz and summary.json."""
     overwrite: bool = False
-    """Replace these files in a folder that is not empty."""
+    """Replace these files if the folder is not empty."""
     video: bool = True
     """Whether to render the video, which takes most of the time."""
     json: bool = False
@@ -87,7 +89,7 @@ class Demo(DemoConfig):
             emit_json(summary)
             return
         _print(summary)
-        print(f"look into {self.out}: {', '.join(written)}")
+        print(f"results in {self.out}: {', '.join(written)}")
 
     def _summary(self, summaries: list[dict[str, Any]]) -> dict[str, Any]:
         """The first robot's summary, and what became of all of them where there are several."""
@@ -140,6 +142,6 @@ def _print(summary: dict[str, Any]) -> None:
         where = f"{shift['from']} → {shift['to']}"
         rows.append(("shift", f"{where} at {shift['x_m']:.1f} m, {shift['time_s']:.1f} s"))
     if "episodes" in summary:
-        rows.append(("robots on their feet", f"{summary['survived_count']}/{summary['episodes']}"))
-        rows.append(("same shifts as the first", f"{summary['as_first_count']}"))
+        rows.append(("survivors", f"{summary['survived_count']}/{summary['episodes']}"))
+        rows.append(("survivors with the shifts of robot 0", f"{summary['as_first_count']}"))
     emit_table("demo", rows)

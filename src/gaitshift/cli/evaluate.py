@@ -47,30 +47,30 @@ UNITS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluate(EvaluationConfig):
-    """Judge a policy: many robots at once, without exploration noise.
+    """Evaluate a policy on many robots, without exploration noise.
 
-    Figures leave out the first 2 s and robots after their fall.
+    Figures exclude the first 2 s and robots after their fall.
     """
 
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
     controller: Literal["policy", "cpg"] = "policy"
-    """What walks: the policy, or, in the gait of this name, coupled oscillators that learned
-    nothing: a baseline (trot, pace, bound, walk)."""
+    """Controller: the policy, or coupled oscillators without learning, as a baseline (trot, pace,
+    bound, walk)."""
     robot_file: Path | None = None
-    """The robot of the policy, if it is not ANYmal B, as it was given to `train`."""
+    """Robot file that was given to `train`, if the robot is not ANYmal B."""
     trials: Literal["all", "short", "quick"] | None = None
-    """Run the standard trials instead, each figure against its limit: all (1000 pushed episodes,
-    then 256 of 20 s on each ground), short (a quarter of each), or quick ones for a first look."""
+    """Run the standard trials and compare each figure with its limit: all (1000 pushed episodes,
+    then 256 of 20 s on each terrain), short (a quarter of each), or quick (for a first check)."""
     commands: bool = False
-    """Instead ask for speeds and stride frequencies over their ranges, on flat ground, and tell
-    what comes of them."""
+    """Track commanded speeds and stride frequencies over their ranges on flat ground, in place of
+    the evaluation."""
     json: bool = False
     """One JSON object on stdout."""
     log: Path | None = None
-    """Write the whole run as an npz log to this file; of trials, the one on flat ground."""
+    """Write the log of the run to this npz file; with --trials, the log of the flat trial."""
     plot: Path | None = None
-    """Draw the gait diagram and the phase circle into this file, ending in .png, .svg or .pdf."""
+    """Draw the gait diagram and the phase circle into this .png, .svg or .pdf file."""
     overwrite: bool = False
     """Replace files that exist."""
 
@@ -143,7 +143,7 @@ class Evaluate(EvaluationConfig):
         else:
             failed = sum(row.passed is False for row in rows)
             limited = sum(row.passed is not None for row in rows)
-            title = f"{loaded.gait}, {size} trials: {limited - failed} of {limited} limits kept"
+            title = f"{loaded.gait}, {size} trials: {limited - failed} of {limited} limits met"
             emit_table(title, [_trial_row(row) for row in rows])
         return figures, log
 
@@ -154,7 +154,7 @@ class Evaluate(EvaluationConfig):
             kept = [asdict(row) for row in rows]
             emit_json({"policy": str(loaded.path), "gait": loaded.gait, "commands": kept})
         else:
-            emit_table(f"{loaded.gait}, what is asked for and what comes of it", _followed(rows))
+            emit_table(f"{loaded.gait}, tracking of commands on flat ground", _followed(rows))
 
     def _config(self) -> EvaluationConfig:
         names = EvaluationConfig.__dataclass_fields__
@@ -164,7 +164,7 @@ class Evaluate(EvaluationConfig):
         """Refuses what cannot be done before any work."""
         for option, path in (("--log", self.log), ("--plot", self.plot)):
             if path is not None and path.is_dir():
-                raise GaitshiftError(f"{path} is a folder; give a file with {option}")
+                raise GaitshiftError(f"{option} must be a file, got the folder {path}")
             if path is not None and path.exists() and not self.overwrite:
                 raise GaitshiftError(f"{path} exists; give another {option}, or --overwrite")
         if self.plot is not None:
@@ -172,18 +172,22 @@ class Evaluate(EvaluationConfig):
 
             check_target(self.plot)
         if self.controller == "cpg" and self.robot_file is not None:
-            raise GaitshiftError("the oscillators know ANYmal B alone: no --robot-file")
+            raise GaitshiftError(
+                "--robot-file must not be given with --controller cpg, which supports ANYmal B only"
+            )
         if self.trials is None and not self.commands:
             return
         mode = "--commands" if self.commands else "--trials"
         if self.controller != "policy":
-            raise GaitshiftError(f"{mode} is for policies: no --controller {self.controller}")
+            raise GaitshiftError(
+                f"{mode} must not be given with --controller {self.controller}, only with policies"
+            )
         if self.commands and (self.trials or self.log or self.plot):
-            raise GaitshiftError("--commands stands alone: no --trials, --log or --plot")
+            raise GaitshiftError("--commands must not be given with --trials, --log or --plot")
         for field in fields(EvaluationConfig):
             if field.name != "seed" and getattr(self, field.name) != field.default:
                 option = field.name.replace("_", "-")
-                raise GaitshiftError(f"{mode} has grounds and lengths of its own: no --{option}")
+                raise GaitshiftError(f"--{option} must not be given with {mode}, which sets it")
 
 
 def _figure_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
@@ -202,7 +206,7 @@ def _figure_rows(figures: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _followed(rows: list[Followed]) -> list[tuple[str, ...]]:
-    head = ("asked", "speed", "cycles", "pattern", "survival")
+    head = ("command", "speed", "cycles", "pattern", "survival")
     return [head] + [
         (
             f"{row.forward_speed:.2f} m/s, {row.stride_frequency:.2f} Hz",

@@ -14,18 +14,18 @@ from gaitshift.shift import GaitGraph
 
 @dataclass(frozen=True, kw_only=True)
 class Gaits:
-    """List the gaits, show one as a Mermaid diagram, or draw them as pictures."""
+    """List the gaits, print the machine of one as a Mermaid diagram, or draw the machines."""
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
-    """A gait by its name, or a machine file ending in .toml; all shipped gaits by default."""
+    """Name of a gait or a machine file (.toml); by default all shipped gaits."""
     graph: str = ""
-    """A gait graph, by its name or a file ending in .toml: checked, and printed as Mermaid."""
+    """Gait graph to check and print as Mermaid: a shipped graph or a .toml file."""
     out: Path | None = None
     """Draw each machine as a picture and a Mermaid file into this folder."""
     overwrite: bool = False
-    """Draw into a folder that is not empty."""
+    """Replace earlier drawings in the folder."""
     json: bool = False
-    """One JSON object on stdout: the machines, whole."""
+    """One JSON object on stdout: the machines."""
 
     def run(self) -> None:
         """Prints, and draws."""
@@ -51,7 +51,7 @@ class Gaits:
             for machine in machines:
                 draw(machine, self.out / f"{machine.name}.png")
                 (self.out / f"{machine.name}.mmd").write_text(mermaid(machine) + "\n")
-            say(f"drawn into {self.out}: {', '.join(files)}")
+            say(f"drawings in {self.out}: {', '.join(files)}")
 
 
 def _line(machine: RewardMachine) -> str:

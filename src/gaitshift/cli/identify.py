@@ -27,27 +27,25 @@ class Identify:
 
     Logs are npz files of `gaitshift record`, `demo` and `evaluate`, or tables (CSV, Parquet) of any
     robot with the columns time, rough, contact_FL, foot_FL_x and so on. Every condition is replayed
-    over a grid of α, β and leaks; the soonest detection that never shifts on smooth ground is
-    chosen. Writes README.md, conditions.csv, courses.csv, a map a condition, ROC curves, and all of
-    it as one page to hover over and zoom into, page.html. A run that was killed goes on where it
-    stopped when the same is asked for again.
+    over a grid of α, β and leak; the setting with the shortest delay and no false shift is chosen.
+    Writes README.md, conditions.csv, courses.csv, a map for each condition, ROC curves and the
+    interactive page page.html. If a run is killed, the same command resumes it.
     """
 
     logs: Annotated[tuple[Path, ...], tyro.conf.Positional]
-    """Logs that choose the numbers."""
+    """Logs for choosing the settings."""
     held_out: tuple[Path, ...] = ()
-    """Logs that judge them, of other seeds; without them the same ones do, and the report says
-    so."""
+    """Logs for judging the settings, of other seeds; by default the logs for choosing them."""
     condition: tuple[str, ...] = ("touchdown_surprise",)
-    """Conditions to compare, by name; `all` for every one that the logs feed."""
+    """Conditions to compare; `all` for every condition whose signals are in the logs."""
     alpha: float | None = None
-    """Judge this α, in each condition's unit, instead of choosing one; with --beta."""
+    """Judge this α, in the unit of the condition, instead of choosing one; needs --beta."""
     beta: float | None = None
-    """… and this β [counts]."""
+    """Judge this β [counts]; needs --alpha."""
     leak: float | None = None
-    """… and this leak [counts a step]; 0 if left out."""
+    """Judge this leak [counts per step]; needs --alpha and --beta, 0 by default."""
     way: Literal["rough", "flat"] = "rough"
-    """What is to be noticed: rough ground ahead, or, for the way back, that it has ended."""
+    """What to detect: the start of rough ground, or, for the way back, its end."""
     out: Path
     """Folder of the report."""
     overwrite: bool = False
@@ -65,13 +63,18 @@ class Identify:
                 f"identify needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
         if not self.logs:
-            raise GaitshiftError("which logs? make some with: gaitshift record trot --out logs")
+            raise GaitshiftError(
+                "logs must be one file or more, got none; make some with: gaitshift record trot "
+                "--out logs"
+            )
         if self.alpha is not None and self.beta is not None:
             numbers = Numbers(self.alpha, self.beta, self.leak or 0.0)
         elif (self.alpha, self.beta, self.leak) == (None, None, None):
             numbers = None
         else:
-            raise GaitshiftError("numbers to judge: give --alpha and --beta, and --leak if any")
+            raise GaitshiftError(
+                "--alpha and --beta must be given together, and --leak only with them"
+            )
         task = Task(
             logs=self.logs,
             held_out=self.held_out,
@@ -101,7 +104,7 @@ class Identify:
             emit_json({"out": str(self.out), "conditions": rows})
         else:
             cells = [reports.CONDITIONS_HEAD, *map(reports.condition_cells, rows)]
-            emit_table(f"conditions, by {len(task.judges)} logs; report in {self.out}", cells)
+            emit_table(f"conditions on {len(task.judges)} logs; report in {self.out}", cells)
 
 
 def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
@@ -115,7 +118,7 @@ def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
             continue  # nothing was tried but the numbers that were given
         name = one.tuned.candidate.name
         condition_map(one, out / f"{name}.png")
-        pictures[f"{name}.png"] = f"How soon {name} notices, over α and β"
+        pictures[f"{name}.png"] = f"Mean delay of {name} over α and β"
     met = hardest_first(judged)
     if met:
         roc_figure(judged, met[0], out / ROC)

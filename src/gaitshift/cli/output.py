@@ -69,7 +69,7 @@ def check_folder(
     was killed has `left` there is no content.
     """
     if folder.exists() and not folder.is_dir():
-        raise GaitshiftError(f"{folder} is a file; give a folder with --out")
+        raise GaitshiftError(f"--out must be a folder, got the file {folder}")
     if overwrite or not folder.is_dir():
         return
     if any(path.name != left for path in folder.iterdir()):
@@ -88,6 +88,6 @@ def check_table_folder(path: Path, *, overwrite: bool) -> None:
 def check_numbers(what: str, count: int, seed: int, *, least: int = 1) -> None:
     """`GaitshiftError` unless there are so many, and the seed is one."""
     if not least <= count <= 1_000_000:
-        raise GaitshiftError(f"{count} {what}: {least} to 1000000 would be right")
+        raise GaitshiftError(f"{what} must be {least} to 1000000, got {count}")
     if seed < 0:
-        raise GaitshiftError(f"seed {seed}: a seed is 0 or larger")
+        raise GaitshiftError(f"seed must be 0 or larger, got {seed}")

@@ -24,42 +24,45 @@ from gaitshift.table import Row
 class Record:
     """Record gaits on the standard courses: flat, slopes, steps, stairs, pebbles, noise.
 
-    Writes OUT/GAIT-COURSE-SEED.npz, a log a gait and course, some 30 MB each. A log that is there
-    already is kept, so that a command that was broken off goes on.
+    Writes OUT/GAIT-COURSE-SEED.npz, one log of about 30 MB for each gait and course. Logs that
+    exist are not recorded again, so an interrupted command resumes.
     """
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Shipped policies by the names of their gaits, or policy files ending in .onnx."""
+    """Gaits of shipped policies, or policy files (.onnx)."""
     out: Path
     """Folder of the logs."""
     courses: tuple[str, ...] = ()
-    """Courses by name; all by default."""
+    """Courses; all by default."""
     robots: int = 64
-    """Robots on each course, on eight grounds where the ground is random."""
+    """Robots on each course; random terrains have eight variants."""
     seconds: float = 20.0
     """Length of a log [s]."""
     seed: int = 0
-    """Seed of grounds and starts: tune a condition on one, judge it on another."""
+    """Seed of terrains and starts; choose settings on one seed and judge them on another."""
     overwrite: bool = False
-    """Record anew what is there already."""
+    """Record existing logs again."""
     json: bool = False
     """One JSON object on stdout."""
 
     def run(self) -> None:
         """Records, and tells what there is."""
         if not self.policies:
-            raise GaitshiftError(f"which gaits? give some of {', '.join(policies.shipped())}")
+            raise GaitshiftError(
+                f"policies must be some of {', '.join(policies.shipped())}, or .onnx files, "
+                "got none"
+            )
         _ = EvaluationConfig(episodes=self.robots, seconds=self.seconds, seed=self.seed)
         loaded = [policies.load(name) for name in self.policies]
         chosen = select(self.courses)
         if self.out.exists() and not self.out.is_dir():
-            raise GaitshiftError(f"{self.out} is a file; give a folder with --out")
+            raise GaitshiftError(f"--out must be a folder, got the file {self.out}")
         gaits = [policy.gait for policy in loaded]
         twice = [gait for gait in gaits if gaits.count(gait) > 1]
         if twice:
             raise GaitshiftError(
-                f"two of the policies are of the gait '{twice[0]}', and would write the same logs; "
-                "record them one by one, each with an --out of its own"
+                f"policies must be of different gaits, got two of '{twice[0]}'; record them one by "
+                "one with different --out"
             )
         asked = [(policy, course) for policy in loaded for course in chosen]
         found = self._found(asked)
@@ -116,8 +119,8 @@ class Record:
             whole = length == steps or (length < steps and bool(log.fallen[-1].all()))
             if not whole or robots != self.robots:
                 raise GaitshiftError(
-                    f"{path} is there already and holds {robots} robots × {log.time[-1]:g} s, not "
-                    f"{self.robots} × {self.seconds:g} s; ask for the same, or --overwrite"
+                    f"{path} has {robots} robots × {log.time[-1]:g} s, got {self.robots} × "
+                    f"{self.seconds:g} s; give the same robots and seconds, or --overwrite"
                 )
             found[path] = _row(path, log)
         return found

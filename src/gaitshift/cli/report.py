@@ -25,23 +25,23 @@ _CHECKPOINTS = 4
 class Report:
     """Make one self-contained page of a log or of a training run.
 
-    Of a log: the robot to turn around, its signals, its gaits. Of a training: what its policies do
-    from checkpoint to checkpoint, its course and its verdicts. The page opens from disk, without a
-    network, on any machine.
+    The page of a log shows the robot in 3D, its signals and its gaits. The page of a training shows
+    its policies at several checkpoints, its learning curves and its verdicts. The page opens from
+    disk without a network.
     """
 
     source: Annotated[Path, tyro.conf.Positional]
-    """A log of `demo`, `evaluate`, `record` or `view`, or the folder of a training."""
+    """Log of `demo`, `evaluate`, `record` or `view`, or the folder of a training."""
     out: Path | None = None
-    """The HTML file; beside the log with its name, or report.html in the run, by default."""
+    """HTML file; by default LOG.html beside the log, or report.html in the training's folder."""
     robot: int = 0
-    """Which robot of the log, counted from 0."""
+    """Index of the robot in the log, from 0."""
     robot_file: Path | None = None
-    """What robot it is, if it is not ANYmal B, as it was given to `train`."""
+    """Robot file that was given to `train`, if the robot is not ANYmal B."""
     video: Path | None = None
-    """An mp4 to show beside it."""
+    """mp4 file to include."""
     overwrite: bool = False
-    """Replace a page that is there."""
+    """Replace an existing page."""
 
     def run(self) -> None:
         """Writes the page."""
@@ -51,9 +51,9 @@ class Report:
         log = None if is_run else Log.load(self.source)
         path = self.out or default
         if path.exists() and not self.overwrite:
-            raise GaitshiftError(f"{path} is there already; --overwrite replaces it")
+            raise GaitshiftError(f"{path} exists; give another --out, or --overwrite")
         if self.video is not None and not self.video.is_file():
-            raise GaitshiftError(f"no video {self.video}")
+            raise GaitshiftError(f"no video file {self.video}")
         if not path.parent.is_dir():
             raise GaitshiftError(f"no folder {path.parent} for the page")
         if log is None:
@@ -70,8 +70,8 @@ class Report:
         final = self.source / "policy.onnx"
         if not final.is_file():
             raise GaitshiftError(
-                f"{self.source} holds no policy.onnx: a log, or the folder of a training that has "
-                "come to an end or was stopped by Ctrl-C, would be right"
+                f"{self.source} must be a log or the folder of a training that finished or was "
+                "stopped by Ctrl-C, got a folder without policy.onnx"
             )
         policy = policies.load(final)
         walks = [*_checkpoints(self.source), ("at the end", _walk(policy))]
@@ -94,7 +94,7 @@ def _checkpoints(folder: Path) -> list[tuple[str, Log]]:
     try:
         from gaitshift.learn.run import Run
     except ImportError as error:
-        say(f"checkpoints are left out: they need '{error.name}' (gaitshift[train])")
+        say(f"no checkpoints: they need the package '{error.name}'; install gaitshift[train]")
         return []
     found = sorted(int(path.stem) for path in (folder / "checkpoints").glob("*.pt"))[:-1]
     found = [iteration for iteration in found if iteration > 0]

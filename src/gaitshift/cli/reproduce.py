@@ -15,28 +15,27 @@ QUICK_RESULTS, QUICK_RUNS = Path("runs/reproduce-quick/results"), Path("runs/rep
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce:
-    """Run the paper's recipe again, for trot, bound and pace over five seeds, and its ablations.
+    """Reproduce the paper: train trot, bound and pace with its recipe on five seeds, and ablations.
 
-    Broken off at any time, the same command goes on where it stopped. It takes about three
-    hours on 2 cores.
+    Takes about three hours on 2 cores. If it is interrupted, the same command resumes.
     """
 
     only: Annotated[tuple[str, ...], names_option] = ()
-    """Train these parts alone: gaits, ablations, or groups of them, such as trot,bonus. The report
-    tells all that has been trained."""
+    """Train only these gaits, ablations or groups of ablations, such as trot,bonus. The report
+    covers all finished runs."""
     out: Path | None = None
-    """Folder for README.md, figures and CSV; docs/results/paper by default."""
+    """Folder for README.md, figures and CSV files; docs/results/paper by default."""
     runs: Path | None = None
     """Folder for the runs; runs/reproduce by default."""
     add: bool = False
-    """Count runs that the report in --out tells of as done, and add to it; their folders may be
-    gone, or on another machine."""
+    """Add to the report in --out: do not repeat runs that it contains, even if their folders no
+    longer exist."""
     jobs: int = os.cpu_count() or 1
-    """Runs at a time, each on one core; by default as many as there are cores."""
+    """Number of runs in parallel, each on one core; by default the number of cores."""
     quick: bool = False
-    """Tiny runs that learn nothing, in runs/reproduce-quick: to see that it works."""
+    """Test run in runs/reproduce-quick: tiny trainings that learn nothing."""
     seed: int = 0
-    """First seed; the others follow it."""
+    """First seed; the other seeds follow it."""
     json: bool = False
     """One JSON object on stdout: the findings and the tables."""
 
@@ -53,13 +52,13 @@ class Reproduce:
                 f"training needs the package '{error.name}'; install gaitshift[train]"
             ) from error
         if not 1 <= self.jobs <= 1024:
-            raise GaitshiftError(f"jobs = {self.jobs}: 1 to 1024 would be right")
+            raise GaitshiftError(f"jobs must be 1 to 1024, got {self.jobs}")
         runs = self.runs or (QUICK_RUNS if self.quick else RUNS)
         out = self.out or (QUICK_RESULTS if self.quick else RESULTS)
         for folder in (runs, out):
             there = next(path for path in (folder, *folder.parents) if path.exists())
             if not there.is_dir():
-                raise GaitshiftError(f"{there} is a file; a folder would be right")
+                raise GaitshiftError(f"--out and --runs must be a folder, got the file {there}")
         plan = Plan.tiny(self.seed) if self.quick else Plan(seed=self.seed)
         told = Told.read(plan, out) if self.add else Told()
         wanted = [job for job in plan.select(self.only) if job.name not in told.courses]
@@ -71,11 +70,13 @@ class Reproduce:
         if self.json:
             emit_json(written)
             return
-        emit_table("does it hold?", [(f["name"], f["verdict"]) for f in written["findings"]])
-        print(f"look into {out}: {', '.join(written['files'])}")
+        emit_table(
+            "verdicts on the paper", [(f["name"], f["verdict"]) for f in written["findings"]]
+        )
+        print(f"results in {out}: {', '.join(written['files'])}")
 
 
 def _say_broken(written: dict[str, Any]) -> None:
     for row in written["ablations"]:
         if row["broke_down"]:
-            say(f"{row['broke_down']} of {row['seeds']} runs of '{row['setting']}' broke down")
+            say(f"{row['broke_down']} of {row['seeds']} runs of '{row['setting']}' diverged")

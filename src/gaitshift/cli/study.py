@@ -27,29 +27,29 @@ TABLE = "crossings.csv"
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Send robots over noise in one gait, in the other, and shifted by each condition.
+    """Compare robots on rough ground: in either gait alone, and with shifts by each condition.
 
-    Tells survival, distance, speed and cost of transport with intervals, beside an oracle that sees
-    the ground. Writes crossings.csv, README.md and a figure. What the table has already is kept, so
-    that a command that was broken off goes on.
+    Reports survival, distance, speed and cost of transport with intervals, and those of an oracle
+    that knows the ground. Writes crossings.csv, README.md and a figure. Rows that the table already
+    has are not repeated, so an interrupted command resumes.
     """
 
     flat_gait: str = "trot"
-    """The gait for flat ground."""
+    """Gait on flat ground."""
     rough_gait: str = "bound"
-    """The gait for rough ground."""
+    """Gait on rough ground."""
     conditions: tuple[str, ...] = tuple(CONDITIONS)
-    """Conditions by name."""
+    """Shift conditions."""
     amplitudes: tuple[float, ...] = (0.0, 0.05, 0.10, 0.15, 0.20, 0.25)
-    """Of the noise [m]."""
+    """Amplitudes of the Perlin noise [m]."""
     runs: int = 512
-    """Robots of each way at each amplitude."""
+    """Robots for each gait or condition at each amplitude."""
     seed: int = 0
-    """Seed of grounds and starts."""
+    """Seed of terrains and starts."""
     out: Path
     """Folder of the results."""
     overwrite: bool = False
-    """Begin anew where there are results already."""
+    """Discard earlier results in the folder."""
     json: bool = False
     """One JSON object on stdout."""
 
@@ -65,7 +65,7 @@ class Study:
         check_numbers("runs", self.runs, self.seed, least=2)
         for amplitude in self.amplitudes:
             if not 0 <= amplitude <= 1:
-                raise GaitshiftError(f"an amplitude of {amplitude:g} m: 0 to 1 m would be right")
+                raise GaitshiftError(f"amplitudes must be 0 to 1 m, got {amplitude:g}")
         every = ways(self.flat_gait, self.rough_gait, self.conditions)
         loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
         path = self.out / TABLE
@@ -104,7 +104,7 @@ class Study:
         if self.json:
             emit_json({"out": str(self.out), "crossings": rows})
         else:
-            emit_table(f"crossings, {self.runs} each; more in {self.out}", _table(rows))
+            emit_table(f"crossings, {self.runs} robots each; results in {self.out}", _table(rows))
 
 
 def _table(rows: list[dict[str, Any]]) -> list[tuple[str, ...]]:

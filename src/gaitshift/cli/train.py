@@ -25,29 +25,28 @@ if TYPE_CHECKING:
 class Train:
     """Train a gait with PPO: flat ground first, then rough ground with pushes.
 
-    The folder gets config.json, progress.csv, verdicts.csv (a short look at the policy at each
-    checkpoint), tensorboard/, checkpoints/ and policy.onnx. Ctrl-C leaves a folder that --resume
-    goes on from.
+    Writes config.json, progress.csv, verdicts.csv (a short evaluation at each checkpoint),
+    tensorboard/, checkpoints/ and policy.onnx. After Ctrl-C, --resume continues the run.
     """
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
-    """A gait by its name (see `gaitshift gaits`), or a machine file ending in .toml."""
+    """Name of a gait (see `gaitshift gaits`) or a machine file (.toml)."""
     preset: Literal["default", "paper"] = "default"
-    """Recipe: ours, or the paper's (Table I alone, 30 robots, Kp 3, Kd 0.2, flat ground)."""
+    """Training recipe: ours, or the paper's (Table I, 30 robots, Kp 3, Kd 0.2, flat ground)."""
     robot_file: Path | None = None
-    """Another robot than ANYmal B, as a .toml file beside its MJCF."""
+    """Robot file (.toml, beside its MJCF file); ANYmal B by default."""
     robots: int | None = None
-    """Robots in parallel; the recipe's by default."""
+    """Number of robots in parallel; by default that of the recipe."""
     iterations: int | None = None
-    """PPO iterations in all; the recipe's by default."""
+    """Total number of PPO iterations; by default that of the recipe."""
     threads: int | None = None
-    """Threads of torch; the recipe's by default. 1 where several trainings share the machine."""
+    """Number of torch threads; by default that of the recipe. Use 1 for parallel trainings."""
     seed: int = 0
-    """Seed of networks, exploration, grounds and pushes."""
+    """Seed of networks, exploration, terrains and pushes."""
     out: Path | None = None
     """Folder of the run; runs/GAIT-SEED by default."""
     resume: Path | None = None
-    """Go on with the run of this folder; its own settings hold."""
+    """Continue the run in this folder, with its own settings."""
     overwrite: bool = False
     """Replace an earlier run in the folder."""
     json: bool = False
@@ -62,14 +61,14 @@ class Train:
             with bar:
                 path = run.train(bar, bar.judge)
         except KeyboardInterrupt:
-            say(f"gaitshift: interrupted; go on with: gaitshift train --resume {run.folder}")
+            say(f"gaitshift: interrupted; continue with: gaitshift train --resume {run.folder}")
             sys.exit(130)
         if self.json:
             emit_json({**bar.row, "verdict": bar.verdict or None, "policy": str(path)})
             return
         if bar.verdict:
             print(f"{_spell(bar.verdict)}, {bar.verdict['misses'] or 'no limit missed'}")
-        print(f"policy written to {path}; judge it with: gaitshift evaluate {path}")
+        print(f"policy written to {path}; evaluate it with: gaitshift evaluate {path}")
 
     def _open(self) -> "Run":
         try:
@@ -81,13 +80,17 @@ class Train:
             ) from error
         if self.resume is not None:
             if self.gait is not None or self.robot_file is not None:
-                raise GaitshiftError("give a gait, or --resume with the folder of a run, not both")
+                raise GaitshiftError(
+                    "a gait and --robot-file must not be given with --resume, which has its own"
+                )
             return Run.resume(self.resume)
         if self.gait is None:
             known = ", ".join(gaits.names())
-            raise GaitshiftError(f"which gait? give one of {known}, a .toml file, or --resume DIR")
+            raise GaitshiftError(
+                f"gait must be one of {known}, or a .toml file, got none; or give --resume DIR"
+            )
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         machine, robot = gaits.load(self.gait), use_robot_file(self.robot_file)
         recipe = PRESETS[self.preset]()
         if self.robots is not None:

@@ -30,26 +30,25 @@ TABLE, PAGE = "transitions.csv", "page.html"
 
 @dataclass(frozen=True, kw_only=True)
 class Transitions:
-    """Swap gaits in an instant: every ordered pair, at every phase of the stride.
+    """Test gait shifts of every ordered pair of gaits at random phases of the stride.
 
-    A shift succeeds when the robot does not fall within 5 s and shows the new gait. Writes
-    transitions.csv, README.md, a heat map a ground, and all of it as one page to hover over,
-    page.html. Pairs that the table has already are kept, so that a command that was broken off
-    goes on.
+    A shift succeeds if the robot does not fall within 5 s and shows the new gait. Writes
+    transitions.csv, README.md, a heat map for each terrain and the interactive page page.html.
+    Pairs that the table already has are not repeated, so an interrupted command resumes.
     """
 
     gaits: Annotated[tuple[str, ...], tyro.conf.Positional] = ("trot", "pace", "bound")
-    """Gaits by name; `all` for every shipped one."""
+    """Gaits; `all` for every shipped gait."""
     grounds: tuple[str, ...] = ("flat", "perlin:0.10")
-    """Grounds, as in `evaluate --terrain`."""
+    """Terrains, as in `evaluate --terrain`."""
     switches: int = 512
-    """Shifts of each pair on each ground."""
+    """Number of shifts of each pair on each terrain."""
     seed: int = 0
-    """Seed of grounds, starts and instants."""
+    """Seed of terrains, starts and phases."""
     out: Path
     """Folder of the results."""
     overwrite: bool = False
-    """Begin anew where there are results already."""
+    """Discard earlier results in the folder."""
     json: bool = False
     """One JSON object on stdout."""
 
@@ -64,7 +63,7 @@ class Transitions:
             ) from error
         names = policies.shipped() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
         if len(names) < 2:
-            raise GaitshiftError("a shift needs two gaits or more")
+            raise GaitshiftError(f"gaits must name two gaits or more, got {len(names)}")
         check_numbers("switches", self.switches, self.seed)
         loaded = {name: policies.load(name) for name in names}
         for ground in self.grounds:
@@ -111,7 +110,7 @@ class Transitions:
         if self.json:
             emit_json({"out": str(self.out), "transitions": rows})
         else:
-            emit_table(f"shifts, {self.switches} each; more in {self.out}", _table(rows))
+            emit_table(f"shifts, {self.switches} each; results in {self.out}", _table(rows))
 
     def _draw(self, rows: list[dict[str, Any]]) -> None:
         """A map a ground, of all that the table has."""

@@ -20,25 +20,25 @@ _LOCAL = ("127.0.0.1", "localhost", "::1")
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Watch robots in the browser: live, with their condition in your hands, or from a log.
+    """Show robots in the browser: a live simulation with controls, or a log.
 
-    Prints the address of the page; Ctrl-C ends it. Needs no screen and no OpenGL on this machine.
+    Prints the address of the page; Ctrl-C ends it. Needs no display and no OpenGL.
     """
 
     log: Annotated[Path | None, tyro.conf.Positional] = None
-    """A log of `demo`, `evaluate`, `record` or of this page; without one robots walk live."""
+    """Log of `demo`, `evaluate`, `record` or `view`; without it, a live simulation."""
     robot_file: Path | None = None
-    """The robot of the log, if it is not ANYmal B, as it was given to `train`."""
+    """Robot file that was given to `train`, if the robot of the log is not ANYmal B."""
     track: str = DemoConfig.track
-    """The ground, piece by piece with lengths in metres."""
+    """Terrain: pieces with lengths in metres."""
     robots: int = 1
-    """Robots on the track, 1 to 16; charts tell of the first."""
+    """Number of robots, 1 to 16; charts show robot 0."""
     condition: str = DemoConfig.condition
-    """When to shift from trot to bound and back, by name."""
+    """Condition for shifts from trot to bound and back."""
     seed: int = 0
-    """Seed of the ground and of the starts."""
+    """Seed of the terrain and the starts."""
     host: str = "127.0.0.1"
-    """Address to listen on; any other than this machine's own lets others give orders too."""
+    """Address to listen on; a public address lets others use the controls."""
     port: int = 8080
     """Port to listen on."""
     out: Path = Path("gaitshift-view")
@@ -61,7 +61,7 @@ class View:
                 f"view needs the package '{error.name}'; install gaitshift[view]"
             ) from error
         if not has_meshes(ANYMAL_B):
-            say("drawn with simple shapes; gaitshift[meshes] brings ANYmal's own (130 MB)")
+            say("drawn with simple shapes; install gaitshift[meshes] (130 MB) for meshes")
         config = LiveConfig(
             track=self.track,
             robots=self.robots,
@@ -75,7 +75,7 @@ class View:
         else:
             shown = Log.load(self.log)
         if self.host not in _LOCAL:
-            say(f"whoever reaches {self.host} can see this page and give orders to the robots")
+            say(f"everyone who can reach {self.host} can see and use this page")
         server = serve(self.host, self.port)
         try:
             if isinstance(shown, Log):
@@ -101,7 +101,7 @@ class View:
         log.save(path)
         write_report(log, page)
         say(f"recorded {path} and {page}")
-        return f"{page} opens from disk; gaitshift view {path} plays it"
+        return f"saved {page} and {path}; play the log with: gaitshift view {path}"
 
 
 def _in_order(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -153,7 +153,7 @@ class Driver:
 
     def _check_known(self, gait: str) -> None:
         if gait not in self.policies:
-            raise GaitshiftError(f"no policy for the gait '{gait}'; known: {', '.join(self.gaits)}")
+            raise GaitshiftError(f"gait must be one of {', '.join(self.gaits)}, got '{gait}'")
 
     def _check(self, start: str) -> None:
         self._check_known(start)
@@ -162,6 +162,6 @@ class Driver:
             if (info.robot, info.gains) != (infos[0].robot, infos[0].gains):
                 raise GaitshiftError(
                     f"the policy of {name} is for {info.robot} with gains '{info.gains}', that of "
-                    f"{self.gaits[0]} for {infos[0].robot} with gains '{infos[0].gains}': "
-                    "robots cannot change body or gains in a shift"
+                    f"{self.gaits[0]} for {infos[0].robot} with gains '{infos[0].gains}'; "
+                    "both policies must be for the same robot and gains"
                 )

@@ -151,7 +151,7 @@ class Observation:
         unknown = [name for name in self.names if name not in known]
         if unknown:
             raise GaitshiftError(
-                f"unknown observation slice '{unknown[0]}'; known: {', '.join(known)}"
+                f"observation slices must be among {', '.join(known)}, got '{unknown[0]}'"
             )
 
     @cached_property

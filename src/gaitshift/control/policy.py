@@ -62,7 +62,7 @@ class Policy:
             GaitshiftError: the file has no critic.
         """
         if not self.has_critic:
-            raise GaitshiftError(f"{self.path} has no critic; export it anew from its run")
+            raise GaitshiftError(f"{self.path} has no critic; export it again from its run")
         return self._run("value", observation)[:, 0]
 
     def _run(self, output: str, observation: np.ndarray) -> np.ndarray:
@@ -91,7 +91,8 @@ def load(name_or_path: str | Path) -> Policy:
         path = _SHIPPED / f"{name_or_path}.onnx"
         if not path.is_file():
             raise GaitshiftError(
-                f"no policy '{name_or_path}'; shipped: {', '.join(shipped())}; or give a .onnx file"
+                f"policy must be one of {', '.join(shipped())} or a .onnx file, got "
+                f"'{name_or_path}'"
             )
     if not path.is_file():
         raise GaitshiftError(f"no policy file {path}")
@@ -113,7 +114,7 @@ def _open(path: Path) -> onnxruntime.InferenceSession:
         return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime has a class for each fault, without a common base
         raise GaitshiftError(
-            f"{path} is not a whole ONNX file (truncated or damaged); export it anew"
+            f"{path} is a truncated or damaged ONNX file; export it again from its run"
         ) from error
 
 
@@ -128,33 +129,31 @@ def _check(policy: Policy) -> None:
     for kind, name, there in (("input", "observation", inputs), ("output", "action", outputs)):
         if name not in there or len(there[name]) != 2:
             raise GaitshiftError(
-                f"its network has no {kind} '{name}' of N rows; export it anew from its run"
+                f"the network must have an {kind} '{name}' of N rows; export it again from its run"
             )
     if outputs["action"][1] != 12:
         raise GaitshiftError(
-            f"its network gives {outputs['action'][1]} actions; 12, one a joint, would be right"
+            f"the network must give 12 actions, one for each joint, got {outputs['action'][1]}"
         )
     if info.robot not in ROBOTS:
         raise GaitshiftError(
-            f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}; any other one needs "
-            "its file (--robot-file)"
+            f"robot must be one of {', '.join(ROBOTS)}, got '{info.robot}'; give another robot "
+            "with --robot-file"
         )
     if info.control_rate != 1.0 / CONTROL_PERIOD:
         raise GaitshiftError(
-            f"it acts {info.control_rate:g} times a second; {1.0 / CONTROL_PERIOD:g} would be right"
+            f"control_rate must be {1.0 / CONTROL_PERIOD:g} Hz, got {info.control_rate:g}"
         )
     robot = policy.robot
     gains = robot.gains_of(info.gains)
     if (gains.kp, gains.kd) != (info.kp, info.kd):
         raise GaitshiftError(
-            f"it was trained with kp {info.kp}, kd {info.kd}, but the preset '{info.gains}' "
-            f"of {robot.name} is kp {gains.kp}, kd {gains.kd}"
+            f"gains must be kp {gains.kp}, kd {gains.kd}, the preset '{info.gains}' of "
+            f"{robot.name}, got kp {info.kp}, kd {info.kd}"
         )
     if list(robot.stance) != info.stance:
-        raise GaitshiftError(f"it was trained from another stance of {robot.name}")
+        raise GaitshiftError(f"stance must be that of {robot.name}, got {info.stance}")
     expected = {name: [s.start, s.stop] for name, s in policy.observation.slices.items()}
     wanted = inputs["observation"][1]
     if expected != info.observation or wanted != policy.observation.size:
-        raise GaitshiftError(
-            f"its observation slices do not add up to its network's {wanted} inputs"
-        )
+        raise GaitshiftError(f"the observation slices must match the network's {wanted} inputs")

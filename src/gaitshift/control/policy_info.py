@@ -62,24 +62,28 @@ def read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
     """
     version = metadata.get("gaitshift.format_version")
     if version is None:
-        raise GaitshiftError(f"{path} is an ONNX file, but not a policy of gaitshift")
+        raise GaitshiftError(f"{path} is an ONNX file but not a gaitshift policy")
     if version != str(FORMAT_VERSION):
         raise GaitshiftError(
-            f"{path} has format version {version}; this gaitshift reads {FORMAT_VERSION}: "
-            "export it with this version"
+            f"{path}: format version must be {FORMAT_VERSION}, got {version}; export the policy "
+            "with this version of gaitshift"
         )
     fields = PolicyInfo.__dataclass_fields__
     missing = [name for name in fields if f"gaitshift.{name}" not in metadata]
     if missing:
-        raise GaitshiftError(f"{path} lacks the metadata '{missing[0]}'; export it anew")
+        raise GaitshiftError(
+            f"{path} lacks the metadata '{missing[0]}'; export it again from its run"
+        )
     try:
         values = {name: json.loads(metadata[f"gaitshift.{name}"]) for name in fields}
     except json.JSONDecodeError as error:
-        raise GaitshiftError(f"{path} has damaged metadata; export it anew") from error
+        raise GaitshiftError(
+            f"{path} has damaged metadata; export it again from its run"
+        ) from error
     try:
         return _info_of(values)
     except GaitshiftError as error:
-        raise GaitshiftError(f"{path}: metadata {error}; export it anew") from error
+        raise GaitshiftError(f"{path}: metadata {error}; export it again from its run") from error
 
 
 def _info_of(values: dict[str, object]) -> PolicyInfo:
@@ -109,14 +113,14 @@ def _info_of(values: dict[str, object]) -> PolicyInfo:
         format_version=read.whole("format_version"),
     )
     if info.stride_frequency_range[0] == 0:
-        raise GaitshiftError("'stride_frequency_range' must begin above 0")
+        raise GaitshiftError("'stride_frequency_range' must begin above 0, got 0")
     return info
 
 
 def _table(values: dict[str, object], key: str) -> dict[str, Any]:
     value = values[key]
     if not isinstance(value, dict):
-        raise GaitshiftError(f"{key!r} must be a table of keys and values, not {shortened(value)}")
+        raise GaitshiftError(f"{key!r} must be a table of keys and values, got {shortened(value)}")
     return cast("dict[str, Any]", value)
 
 
@@ -126,14 +130,14 @@ def _ends(name: str, ends: object) -> list[int]:
         whole = [end for end in cast("list[object]", ends) if type(end) is int]
     if len(whole) != 2 or ends != whole:
         told = shortened(cast(object, ends))
-        raise GaitshiftError(f"'observation' must give {name!r} a start and an end, not {told}")
+        raise GaitshiftError(f"'observation' must give {name!r} a start and an end, got {told}")
     return whole
 
 
 def _above_0(read: Table, key: str) -> float:
     value = read.number(key)
     if not 0 < value < inf:
-        raise GaitshiftError(f"{key!r} must be a finite number above 0, not {value:g}")
+        raise GaitshiftError(f"{key!r} must be a finite number above 0, got {value:g}")
     return value
 
 
@@ -147,6 +151,6 @@ def _range(read: Table, key: str) -> list[float]:
     low, high = read.numbers(key, 2, "two numbers, such as [0.4, 1.6]")
     if not 0 <= low <= high < inf:
         raise GaitshiftError(
-            f"{key!r} must be two finite numbers, 0 or above and rising, not {low:g} to {high:g}"
+            f"{key!r} must be two finite, rising numbers from 0 up, got {low:g} to {high:g}"
         )
     return [low, high]

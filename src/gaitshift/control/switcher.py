@@ -79,7 +79,9 @@ class Autonomous:
             for g in (self.graph, graph)
         )
         if before != after:
-            raise GaitshiftError("a graph with the same edges and statistics would be right")
+            raise GaitshiftError(
+                "a running graph cannot change its edges or statistics, only their numbers"
+            )
         self.graph = graph
 
     def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:

@@ -34,24 +34,24 @@ def check_lockout(edges: tuple[Edge, ...], dwell: int, dwell_range: tuple[int, i
     """
     if dwell > 0 and dwell_range[0] == 0:
         raise GaitshiftError(
-            f"dwell_range must begin at 1 or above where dwell is {dwell}: a command of 0 would"
-            " end the lock-out"
+            f"dwell_range must begin at 1 or more where dwell is above 0, got {dwell_range[0]} with"
+            f" dwell {dwell}"
         )
     for number, edge in enumerate(edges, start=1):
         if dwell == 0 and edge.guard.dwell > 0:
             raise GaitshiftError(
-                f"{_title(number, edge)}: a dwell of {edge.guard.dwell} would be lost, since the"
-                " machine's own is 0; give that 1 or above"
+                f"{_title(number, edge)}: dwell must be 0 where the machine's dwell is 0, got"
+                f" {edge.guard.dwell}; give the machine a dwell of 1 or more"
             )
 
 
 def _check_names(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
     if not states:
-        raise GaitshiftError("there is no state; give at least one [[state]]")
+        raise GaitshiftError("there must be at least one [[state]], got none")
     names = tuple(state.name for state in states)
     for number, name in enumerate(names, start=1):
         if name in names[: number - 1]:
-            raise GaitshiftError(f"state {number}: the name {name!r} is taken already")
+            raise GaitshiftError(f"state {number}: names must differ, got {name!r} again")
     for number, edge in enumerate(edges, start=1):
         for name in (edge.source, edge.target):
             if name not in names:
@@ -60,14 +60,16 @@ def _check_names(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
 
 def _check_ways_out(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
     if states[0].accepting:
-        raise GaitshiftError(f"state {states[0].name} is the first, so it cannot be accepting")
+        raise GaitshiftError(f"state {states[0].name}: the first state must not be accepting")
     left = {edge.source: _title(number, edge) for number, edge in enumerate(edges, start=1)}
     for state in states:
         if state.accepting and state.name in left:
-            raise GaitshiftError(f"{left[state.name]}: no transition leaves an accepting state")
+            raise GaitshiftError(
+                f"{left[state.name]}: a transition must not leave an accepting state"
+            )
         if not state.accepting and state.name not in left:
             raise GaitshiftError(
-                f"state {state.name} has no way out; add a transition from it or accepting = true"
+                f"state {state.name} has no transition from it; add one or set accepting = true"
             )
 
 
@@ -77,7 +79,7 @@ def _check_reached(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
         reached |= new
     if lost := [state.name for state in states if state.name not in reached]:
         raise GaitshiftError(
-            f"state {lost[0]} is never reached from {states[0].name}, the first state"
+            f"state {lost[0]} cannot be reached from the first state, {states[0].name}"
         )
 
 
@@ -88,8 +90,8 @@ def _check_one_at_a_time(edges: tuple[Edge, ...]) -> None:
         feet = one.guard.pattern_shared_with(other.guard)
         if feet is not None:
             raise GaitshiftError(
-                f"{_title(i, one)} and {_title(j, other)} can hold at once,"
-                f" with {feet_text(feet)} down"
+                f"{_title(i, one)} and {_title(j, other)}: only one guard may hold at a time, both"
+                f" hold with {feet_text(feet)} down"
             )
 
 
@@ -103,13 +105,13 @@ def _check_stances(states: dict[str, State], edges: tuple[Edge, ...]) -> None:
         source, target = states[edge.source], states[edge.target]
         if edge.guard.holds_in(source.stance):
             raise GaitshiftError(
-                f"{_title(number, edge)}: the guard holds in the stance of {source.name} itself,"
-                f" {source.stance_text()}, which would be left without a step"
+                f"{_title(number, edge)}: the guard must not hold in the stance of its source"
+                f" {source.name} ({source.stance_text()})"
             )
         if (edge.source, edge.target) not in shown:
             raise GaitshiftError(
-                f"{_title(number, edge)}: the guard does not hold in the stance of {target.name},"
-                f" {target.stance_text()}, which it leads to"
+                f"{_title(number, edge)}: the guard must hold in the stance of its target"
+                f" {target.name} ({target.stance_text()})"
             )
 
 

@@ -81,23 +81,27 @@ class Definition:
     def __post_init__(self):
         if not _NAME.fullmatch(self.name):
             raise GaitshiftError(
-                f"name {self.name!r} must be letters, digits, '_' and '-', a letter first"
+                f"name must be letters, digits, '_' and '-', a letter first, got {self.name!r}"
             )
         check_dwell(self.dwell)
         for leg, phase in zip(LEGS, self.ideal_phase, strict=True):
             if not 0 <= phase < 1:
-                raise GaitshiftError(f"ideal_phase: {leg} must be 0 to below 1, not {phase:g}")
+                raise GaitshiftError(
+                    f"ideal_phase: {leg} must be at least 0 and below 1, got {phase:g}"
+                )
         for name, own in (("dwell", self.dwell), ("speed", self.speed)):
             low, high = getattr(self, f"{name}_range")
             if not 0 <= low <= own <= high:
                 raise GaitshiftError(
-                    f"{name}_range must be two numbers, rising, with {name} = {own:g} in between,"
-                    f" not {low:g} to {high:g}"
+                    f"{name}_range must be two rising numbers with {name} = {own:g} between them,"
+                    f" got {low:g} to {high:g}"
                 )
         if self.speed == 0:
-            raise GaitshiftError("speed must be above 0 m/s; its range may begin at 0")
+            raise GaitshiftError(f"speed must be above 0 m/s, got {self.speed:g}")
         if not self.speed_range[1] <= MOST_SPEED:
-            raise GaitshiftError(f"speed_range must end at {MOST_SPEED:g} m/s or below")
+            raise GaitshiftError(
+                f"speed_range must end at {MOST_SPEED:g} m/s or below, got {self.speed_range[1]:g}"
+            )
         check_dwell(self.dwell_range[1])
         check(self.states, self.edges)
         check_lockout(self.edges, self.dwell, self.dwell_range)

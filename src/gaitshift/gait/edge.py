@@ -38,10 +38,10 @@ class Edge:
     def __post_init__(self):
         if self.source == self.target:
             raise GaitshiftError(
-                "a transition must lead to another state; where no guard holds the machine stays"
+                f"'from' and 'to' must be different states, got {self.source!r} for both"
             )
         if not math.isfinite(self.bonus):
-            raise GaitshiftError(f"bonus must be a finite number, not {self.bonus}")
+            raise GaitshiftError(f"bonus must be a finite number, got {self.bonus}")
         check_swing_height(self.swing_height)
 
     def mirrored(self) -> "Edge":
@@ -94,4 +94,4 @@ class Edge:
 def check_swing_height(height: float) -> None:
     """Refuse a negative or absurd swing height [m], with a `GaitshiftError`."""
     if not 0 <= height <= MOST_SWING_HEIGHT:
-        raise GaitshiftError(f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, not {height:g}")
+        raise GaitshiftError(f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, got {height:g}")

@@ -12,7 +12,7 @@ _IN_MIRROR = {leg: LEGS[mirrored] for leg, mirrored in zip(LEGS, MIRRORED_LEGS, 
 def check_feet(feet: Feet) -> None:
     """Refuse names that are not feet, with a `GaitshiftError`."""
     for foot in sorted(feet.difference(LEGS)):
-        raise GaitshiftError(f"unknown foot {foot!r}; feet are {', '.join(LEGS)}")
+        raise GaitshiftError(f"foot must be one of {', '.join(LEGS)}, got {foot!r}")
 
 
 def in_leg_order(feet: Feet) -> list[str]:

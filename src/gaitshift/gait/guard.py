@@ -37,7 +37,9 @@ class Guard:
     def __post_init__(self):
         check_feet(self.down | self.up)
         if both := self.down & self.up:
-            raise GaitshiftError(f"{feet_text(both)} cannot be both down and up")
+            raise GaitshiftError(
+                f"a foot must be in 'down' or in 'up', got {feet_text(both)} in both"
+            )
         check_dwell(self.dwell)
 
     def holds_in(self, feet: Feet) -> bool:
@@ -73,4 +75,4 @@ class Guard:
 def check_dwell(dwell: int) -> None:
     """Refuse a negative or absurd dwell, with a `GaitshiftError`."""
     if not 0 <= dwell <= MOST_DWELL:
-        raise GaitshiftError(f"dwell must be 0 to {MOST_DWELL} control steps, not {dwell}")
+        raise GaitshiftError(f"dwell must be 0 to {MOST_DWELL} control steps, got {dwell}")

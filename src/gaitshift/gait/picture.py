@@ -43,9 +43,9 @@ def draw(machine: RewardMachine, path: Path) -> None:
     Raises `GaitshiftError` for another file ending or a folder that is not there.
     """
     if path.suffix.lower() not in FORMATS:
-        raise GaitshiftError(f"{path}: the name of a picture ends in {', '.join(FORMATS)}")
+        raise GaitshiftError(f"{path}: the name of a picture must end in {' or '.join(FORMATS)}")
     if not path.parent.is_dir():
-        raise GaitshiftError(f"{path}: there is no folder {path.parent}")
+        raise GaitshiftError(f"{path}: no folder {path.parent}")
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 

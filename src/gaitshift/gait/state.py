@@ -33,11 +33,11 @@ class State:
     def __post_init__(self):
         if not _NAME.fullmatch(self.name):
             raise GaitshiftError(
-                f"name {self.name!r} must be letters, digits and underscores, a letter first"
+                f"name must be letters, digits and underscores, a letter first, got {self.name!r}"
             )
         check_feet(self.stance)
         if self.accepting and self.stance:
-            raise GaitshiftError("an accepting state stands for no stance; leave 'stance' out")
+            raise GaitshiftError("an accepting state must not have a 'stance'; leave it out")
 
     def mirrored(self) -> "State":
         """Return the state of the robot seen in a mirror; feet in its name change too."""

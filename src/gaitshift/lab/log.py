@@ -104,15 +104,15 @@ class Log:
             with path.open("rb") as file:
                 entries = np.load(file)
                 if not isinstance(entries, np.lib.npyio.NpzFile):
-                    raise ValueError("it holds one array alone")
+                    raise ValueError("it holds a single array")
                 values: dict[str, Any] = {name: entries[name] for name in names if name in entries}
         except FileNotFoundError as error:
             raise GaitshiftError(f"no log file {path}") from error
         except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
-            raise GaitshiftError(f"{path} is not a whole npz file: {error}") from error
+            raise GaitshiftError(f"{path} is not a complete npz file: {error}") from error
         missing = [name for name in names if name not in values and name != "value"]
         if missing:
-            raise GaitshiftError(f"{path} is no log of gaitshift: it lacks '{missing[0]}'")
+            raise GaitshiftError(f"{path} is not a gaitshift log: it lacks '{missing[0]}'")
         for name in ("robot", "terrain"):
             values[name] = str(values[name])
         values["gaits"] = tuple(str(name) for name in np.atleast_1d(values["gaits"]))

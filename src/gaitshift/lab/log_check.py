@@ -60,17 +60,13 @@ def _shaped(
             right = ", ".join(str(sizes.get(dim, dim)) for dim in wanted)
             right += "," if len(wanted) == 1 else ""
             raise GaitshiftError(
-                f"{path}: '{name}' has the shape {array.shape}; ({right}) would be right"
+                f"{path}: '{name}' must have the shape ({right}), got {array.shape}"
             )
         given = {"u": "i"}.get(array.dtype.kind, array.dtype.kind)
         if given != kind and (given, kind) != ("i", "f"):
-            raise GaitshiftError(
-                f"{path}: '{name}' holds {array.dtype}; {_HOLDS[kind]} would be right"
-            )
+            raise GaitshiftError(f"{path}: '{name}' must hold {_HOLDS[kind]}, got {array.dtype}")
         if 0 in array.shape:
-            raise GaitshiftError(
-                f"{path}: '{name}' is empty, {array.shape}; a log has steps and robots"
-            )
+            raise GaitshiftError(f"{path}: '{name}' must not be empty, got the shape {array.shape}")
         sizes |= zip(wanted, array.shape, strict=True)
         as_it_is = array.dtype.kind == kind
         shaped[name] = array if as_it_is else array.astype({"f": float, "i": np.int64}[kind])
@@ -92,20 +88,20 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
         finite = np.isfinite(values[name])
         if not finite.all():
             raise GaitshiftError(
-                f"{path}: '{name}' is not finite{_where(~finite, name)}; numbers would be right"
+                f"{path}: '{name}' must be finite, got NaN or infinity{_where(~finite, name)}"
             )
     length = np.linalg.norm(values["qpos"][..., 3:7], axis=-1)
     wrong = np.abs(length - 1.0) > 0.01
     if wrong.any():
         raise GaitshiftError(
-            f"{path}: 'qpos' has a quaternion of length {length[wrong][0]:.3g}"
-            f"{_where(wrong, 'qpos')}; 1 would be right"
+            f"{path}: quaternions in 'qpos' must have length 1, got {length[wrong][0]:.3g}"
+            f"{_where(wrong, 'qpos')}"
         )
     gait, names = values["gait"], values["gaits"]
     if gait.min() < 0 or gait.max() >= len(names):
         raise GaitshiftError(
-            f"{path}: 'gait' reaches from {gait.min()} to {gait.max()}; 0 to {len(names) - 1} "
-            "would be right, places in 'gaits'"
+            f"{path}: 'gait' must be 0 to {len(names) - 1}, an index into 'gaits', got "
+            f"{gait.min()} to {gait.max()}"
         )
 
 
@@ -125,19 +121,19 @@ def _check_time(path: Path, time: np.ndarray) -> None:
     standing = np.flatnonzero(apart <= 0.0)
     if standing.size:
         raise GaitshiftError(
-            f"{path}: 'time' does not rise at entry {standing[0] + 1}; entries must be in order, "
-            "each time once"
+            f"{path}: 'time' must rise from entry to entry, got {time[standing[0] + 1]:.4g} s "
+            f"after {time[standing[0]]:.4g} s at entry {standing[0] + 1}"
         )
     period = float(apart[0])
     if not LEAST_PERIOD <= period <= MOST_PERIOD:
         raise GaitshiftError(
-            f"{path}: entries of 'time' are {period:.4g} apart; it is in seconds, and "
-            f"{LEAST_PERIOD:g} to {MOST_PERIOD:g} s would be right"
+            f"{path}: entries of 'time' must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s apart, got "
+            f"{period:.4g}; the unit is seconds"
         )
     changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
     if changed.size:
         at = changed[0]
         raise GaitshiftError(
-            f"{path}: entry {at + 1} of 'time' comes {apart[at]:.4g} s after the one before, the "
-            f"first ones {period:.4g} s: one rate throughout would be right"
+            f"{path}: entries of 'time' must be equally spaced, got {period:.4g} s at first and "
+            f"{apart[at]:.4g} s at entry {at + 1}"
         )

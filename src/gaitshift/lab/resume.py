@@ -46,7 +46,7 @@ def run_missing(
             with progress(part.name) as report:
                 row = part.work(report)
         else:
-            say(f"{part.name} is there already, and kept")
+            say(f"{part.name} exists, not repeated")
         rows.append(row)
     return rows
 
@@ -91,8 +91,8 @@ class ResumableTable:
             for name, wanted in same.items():
                 if row[name] != wanted:
                     raise GaitshiftError(
-                        f"{path} has {what} with {name} = {row[name]}, not {wanted}: give that, "
-                        "another --out, or --overwrite to begin anew"
+                        f"{name} must be {row[name]} to add to {path}, got {wanted}; give that, "
+                        "another --out, or --overwrite to discard it"
                     )
         path.parent.mkdir(parents=True, exist_ok=True)
         return cls(path, columns, key=key, rows=rows)

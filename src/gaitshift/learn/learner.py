@@ -60,7 +60,7 @@ class Learner:
         self._check_weights()
         for name, value in seen.items():
             if not isfinite(value):
-                raise DivergedError(f"the training broke down: {name} is {value}")
+                raise DivergedError(f"training diverged: {name} is {value}")
         return seen
 
     def _collect_and_update(self) -> dict[str, float]:
@@ -92,15 +92,13 @@ class Learner:
         for network, model in (("actor", self.ppo.actor), ("critic", self.ppo.critic)):
             for name, weights in model.named_parameters():
                 if not weights.isfinite().all():
-                    raise DivergedError(
-                        f"the training broke down: {name} of the {network} is not finite"
-                    )
+                    raise DivergedError(f"training diverged: {name} of the {network} is not finite")
 
     def _collect(self, statistics: "_Statistics") -> None:
         ppo, scale = self.ppo, self.recipe.ppo.reward_scale
         action = ppo.act(self._observation)
         if action.isnan().any():
-            raise DivergedError("the training broke down: an action is not a number")
+            raise DivergedError("training diverged: an action is not a number")
         observation, reward, terminated, truncated, info = self.env.step(action.numpy())
         statistics.add(reward, terminated, truncated, info)
         rewards = torch.from_numpy(scale * reward).float()

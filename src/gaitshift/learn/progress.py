@@ -24,10 +24,10 @@ def read(path: Path) -> list[dict[str, str]]:
     try:
         rows = table.read(path, may_be_cut=True)
     except GaitshiftError as error:
-        raise GaitshiftError(f"{error}; remove it to go on") from error
+        raise GaitshiftError(f"{error}; remove it to continue") from error
     for number, row in enumerate(rows, start=2):
         if not row.get("iteration", "").isdecimal():
-            raise GaitshiftError(f"{path}, line {number} is damaged; remove it to go on")
+            raise GaitshiftError(f"{path}, line {number} is damaged; remove it to continue")
     return rows
 
 

@@ -107,13 +107,15 @@ class Stage:
     def __post_init__(self) -> None:
         for name in ("settle", "averaged"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                raise GaitshiftError(f"{name} = {getattr(self, name)}: 0 to 1 would be right")
+                raise GaitshiftError(f"{name} must be 0 to 1, got {getattr(self, name)}")
         for name in ("kl_factor", "horizon_factor", "trace_factor"):
             if not getattr(self, name) > 0.0:
-                raise GaitshiftError(f"{name} = {getattr(self, name)}: more than 0 would be right")
+                raise GaitshiftError(f"{name} must be above 0, got {getattr(self, name)}")
         unknown = [kind for kind in self.fields if kind not in FIELD_KINDS]
         if unknown or not self.fields:
-            raise GaitshiftError(f"fields {unknown}: some of {', '.join(FIELD_KINDS)} are right")
+            raise GaitshiftError(
+                f"fields must be some of {', '.join(FIELD_KINDS)}, got {self.fields}"
+            )
 
     @property
     def is_rough(self) -> bool:
@@ -198,12 +200,15 @@ class Recipe:
         ):
             value = getattr(self, name)
             if not low <= value <= high:
-                raise GaitshiftError(f"{name} = {value}: {low} to {high} would be right")
+                raise GaitshiftError(f"{name} must be {low} to {high}, got {value}")
         for name in ("strict", "command"):
             if not 0 <= getattr(self, f"{name}_from") < getattr(self, f"{name}_until"):
-                raise GaitshiftError(f"{name}_from must be 0 or more and lie before {name}_until")
+                raise GaitshiftError(f"{name}_from must be 0 or more and below {name}_until")
         if any(stage.iterations < 0 for stage in self.stages) or self.iterations < 1:
-            raise GaitshiftError("iterations: at least 1 would be right")
+            raise GaitshiftError(
+                "iterations of the stages must be 0 or more and 1 or more together, got "
+                f"{[stage.iterations for stage in self.stages]}"
+            )
 
     @property
     def iterations(self) -> int:
@@ -213,7 +218,7 @@ class Recipe:
     def with_iterations(self, iterations: int) -> "Recipe":
         """The same recipe cut, or its last stage drawn out, to this number of iterations."""
         if iterations < 1:
-            raise GaitshiftError(f"{iterations} iterations: at least 1 would be right")
+            raise GaitshiftError(f"iterations must be 1 or more, got {iterations}")
         stages: list[Stage] = []
         left = iterations
         for index, stage in enumerate(self.stages, start=1):

@@ -133,7 +133,7 @@ class Run:
             raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
         checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
         if not checkpoints:
-            raise GaitshiftError(f"{folder / CHECKPOINTS} holds no checkpoint to go on from")
+            raise GaitshiftError(f"{folder / CHECKPOINTS} has no checkpoint to resume from")
         run._load_checkpoint(checkpoints[-1])
         return run
 
@@ -290,7 +290,7 @@ def _read_checkpoint(path: Path) -> dict[str, Any]:
         return torch.load(path, weights_only=True)
     except Exception as error:  # torch has no common class for a damaged file
         raise GaitshiftError(
-            f"{path} is damaged; remove it to go on from the one before"
+            f"{path} is damaged; remove it to resume from the checkpoint before it"
         ) from error
 
 
@@ -306,5 +306,5 @@ def _versions() -> dict[str, str]:
 def _clear(folder: Path) -> None:
     """Empties the folder of an earlier run; anything else in it is not ours to delete."""
     if not (folder / CONFIG).is_file():
-        raise GaitshiftError(f"{folder} is not a training run, so it is not overwritten")
+        raise GaitshiftError(f"{folder} is not a training run and is not overwritten")
     shutil.rmtree(folder)

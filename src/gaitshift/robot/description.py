@@ -55,9 +55,13 @@ class Robot:
 
     def __post_init__(self) -> None:
         if len(self.stance) != 12:
-            raise GaitshiftError(f"robot {self.name}: a stance has 12 joint angles")
+            raise GaitshiftError(
+                f"robot {self.name}: stance must have 12 joint angles, got {len(self.stance)}"
+            )
         if "default" not in self.gains:
-            raise GaitshiftError(f"robot {self.name}: gains need a preset named 'default'")
+            raise GaitshiftError(
+                f"robot {self.name}: gains must have a preset 'default', got {list(self.gains)}"
+            )
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -73,7 +77,7 @@ class Robot:
         """The gains of a preset, or an error that lists the presets."""
         if preset not in self.gains:
             known = ", ".join(self.gains)
-            raise GaitshiftError(f"robot {self.name} has no gains '{preset}'; known: {known}")
+            raise GaitshiftError(f"robot {self.name}: gains must be one of {known}, got '{preset}'")
         return self.gains[preset]
 
     def spec(self, gains: Gains) -> "mujoco.MjSpec":

@@ -33,17 +33,17 @@ def read_robot(path: Path) -> Robot:
     """The robot in a TOML file, with its model checked.
 
     Raises:
-        GaitshiftError: one line that begins with the file's path, and says what would be right.
+        GaitshiftError: one line that begins with the file's path.
     """
     with located(str(path)):
         table = Table(tables_in(path), keys=_KEYS)
         name = table.text("name")
         if name == ANYMAL_B.name:
-            raise GaitshiftError(f"'{name}' comes with the package; give another name")
+            raise GaitshiftError(f"'name' must not be that of a robot of the package, got '{name}'")
         numbers = {key: table.number(key) for key in _NUMBERS}
         for key, value in numbers.items():
             if not value > 0:
-                raise GaitshiftError(f"'{key}' must be positive, not {value:g}")
+                raise GaitshiftError(f"'{key}' must be above 0, got {value:g}")
         stance = table.numbers("stance", 12, "12 angles: FL, FR, BL, BR × (HAA, HFE, KFE)")
         gains = {preset: _gains(preset, of) for preset, of in table.table("gains").items()}
         model_file = path.parent / table.text("model")
@@ -76,7 +76,9 @@ def use_robot(robot: Robot) -> None:
     """
     known = ROBOTS.get(robot.name)
     if known is not None and known != robot:
-        raise GaitshiftError(f"another robot is called '{robot.name}'; give another name")
+        raise GaitshiftError(
+            f"robot names must differ, got '{robot.name}' for two robots; rename one"
+        )
     ROBOTS[robot.name] = robot
 
 
@@ -94,7 +96,7 @@ def from_dict(data: dict[str, Any]) -> Robot:
     gains = {name: Gains(**values) for name, values in data["gains"].items()}
     path = Path(data["model_file"])
     if not path.is_file():
-        raise GaitshiftError(f"the model of the robot '{data['name']}' is gone: {path}")
+        raise GaitshiftError(f"robot '{data['name']}': no model file {path}")
     values = {**data, "gains": gains, "model_file": path, "stance": tuple(data["stance"])}
     return Robot(**cast(dict[str, Any], values))
 
@@ -104,24 +106,26 @@ def _gains(preset: str, data: object) -> Gains:
         table = Table(data, keys=("kp", "kd"))
         kp, kd = table.number("kp"), table.number("kd")
         if kp <= 0 or kd < 0:
-            raise GaitshiftError(
-                f"kp {kp:g}, kd {kd:g}: more than 0, and 0 or more, would be right"
-            )
+            raise GaitshiftError(f"kp must be above 0 and kd 0 or more, got {kp:g} and {kd:g}")
         return Gains(kp=kp, kd=kd)
 
 
 def _checked_model(robot: Robot) -> mujoco.MjModel:
     """The robot's model compiled; one line where it is not what `World` works on."""
     if not robot.model_file.is_file():
-        raise GaitshiftError("there is no such file")
+        raise GaitshiftError("no such file")
     try:
         model = cast(mujoco.MjModel, robot.spec(robot.gains_of("default")).compile())
     except ValueError as error:
-        raise GaitshiftError(f"MuJoCo cannot read it: {' '.join(str(error).split())}") from None
+        raise GaitshiftError(
+            f"MuJoCo cannot read the model: {' '.join(str(error).split())}"
+        ) from None
     joints = [model.joint(i).name for i in range(model.njnt)]
     free = model.njnt > 0 and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
     if not free:
-        raise GaitshiftError("its first joint must be the free joint of the base")
+        raise GaitshiftError(
+            f"the first joint must be the free joint of the base, got {joints[:1]}"
+        )
     _compare("joints after the free one", joints[1:], robot.joint_names)
     driven = [model.joint(int(joint)).name for joint in model.actuator_trnid[:, 0]]
     _compare("actuators, by the joints they turn,", driven, robot.joint_names)
@@ -131,15 +135,15 @@ def _checked_model(robot: Robot) -> mujoco.MjModel:
         body = model.site(f"{leg}_foot").bodyid[0] if _has_site(model, f"{leg}_foot") else None
         if body is None or not touching[model.geom_bodyid == body].any():
             raise GaitshiftError(
-                f"a site {leg}_foot, and on its body a shape with conaffinity 1, would be right"
+                f"there must be a site {leg}_foot on a body with a geom of conaffinity 1"
             )
     if not (model.geom_group[model.geom_bodyid == model.jnt_bodyid[0]] <= 2).any():
-        raise GaitshiftError("no shape of its base is in group 0, 1 or 2: those are drawn")
+        raise GaitshiftError("the base must have a geom in group 0, 1 or 2 to be drawn, got none")
     substeps = CONTROL_PERIOD / model.opt.timestep
     if abs(substeps - round(substeps)) > 1e-6 or round(substeps) < 1:
         raise GaitshiftError(
-            f"a timestep of {model.opt.timestep:g} s does not divide {CONTROL_PERIOD:g} s; "
-            "0.0025 would be right"
+            f"timestep must divide {CONTROL_PERIOD:g} s, as 0.0025 s does, got "
+            f"{model.opt.timestep:g} s"
         )
     return model
 
@@ -154,8 +158,8 @@ def _compare(what: str, found: list[str], wanted: tuple[str, ...]) -> None:
     here = found[at] if at < len(found) else "nothing"
     right = wanted[at] if at < len(wanted) else "nothing"
     raise GaitshiftError(
-        f"{what} must be {', '.join(wanted[:4])} … {wanted[-1]}; number {at + 1} is {here}, "
-        f"{right} would be right"
+        f"{what} must be {', '.join(wanted[:4])} … {wanted[-1]}; number {at + 1} must be {right}, "
+        f"got {here}"
     )
 
 
@@ -171,7 +175,7 @@ def _with_height(robot: Robot, model: mujoco.MjModel) -> Robot:
     feet = [float(data.site(f"{leg}_foot").xpos[2]) for leg in LEGS]
     if (apart := max(feet) - min(feet)) > _LEVEL:
         raise GaitshiftError(
-            f"in the stance the feet are {100 * apart:.0f} cm apart in height; level feet "
-            f"would be right (angles in the order of {', '.join(LEGS)} × {', '.join(JOINTS)})"
+            f"stance must put the feet at one height, got heights {100 * apart:.0f} cm apart; "
+            f"angles are in the order {', '.join(LEGS)} × {', '.join(JOINTS)}"
         )
     return replace(robot, stance_height=robot.foot_radius - min(feet))

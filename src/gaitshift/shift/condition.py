@@ -76,11 +76,11 @@ class Condition:
         try:
             _ = self.rough
         except GaitshiftError as error:
-            raise GaitshiftError(f"the way to the rough gait: {error}") from None
+            raise GaitshiftError(f"shift to the rough gait: {error}") from None
         try:
             _ = self.flat
         except GaitshiftError as error:
-            raise GaitshiftError(f"the way back: {error}") from None
+            raise GaitshiftError(f"shift back to the flat gait: {error}") from None
 
     @property
     def rough(self) -> Rule:

@@ -60,10 +60,13 @@ class GaitGraph:
 
     def __post_init__(self) -> None:
         if not self.edges:
-            raise GaitshiftError("a gait graph needs an edge or more")
+            raise GaitshiftError("a gait graph must have at least one edge, got none")
         for edge in self.edges:
             if edge.source == edge.target:
-                raise GaitshiftError(f"edge {edge.name} leads from a gait to itself")
+                raise GaitshiftError(
+                    f"edge {edge.name}: source and target must be different gaits, got "
+                    f"{edge.source!r} for both"
+                )
             if edge.statistic not in self.statistics:
                 known = tuple(self.statistics)
                 raise GaitshiftError(
@@ -72,8 +75,8 @@ class GaitGraph:
         for a, b in combinations(self.edges, 2):
             if a.source == b.source and a.priority == b.priority:
                 raise GaitshiftError(
-                    f"edges {a.name} and {b.name} can fire in the same step: "
-                    "give them different priorities"
+                    f"edges {a.name} and {b.name} leave the same gait with the same priority "
+                    f"{a.priority}; priorities must differ"
                 )
         self._check_reach()
 
@@ -83,7 +86,9 @@ class GaitGraph:
             reached |= more
         lost = [gait for gait in self.gaits if gait not in reached]
         if lost:
-            raise GaitshiftError(f"no way leads from '{self.start}' to the gait '{lost[0]}'")
+            raise GaitshiftError(
+                f"no edges lead from the start gait '{self.start}' to the gait '{lost[0]}'"
+            )
 
     @property
     def gaits(self) -> tuple[str, ...]:
@@ -95,7 +100,9 @@ class GaitGraph:
     def of(cls, condition: Condition, *, flat: str, rough: str) -> "GaitGraph":
         """The paper's two gaits: one condition, the way there and the way back."""
         if flat == rough:
-            raise GaitshiftError(f"the gaits for flat and for rough ground are both '{flat}'")
+            raise GaitshiftError(
+                f"the gaits for flat and rough ground must differ, got '{flat}' for both"
+            )
         watched: dict[str, AnyStatistic] = {"ground": condition.statistic}
         back = "ground"
         if condition.statistic_back is not None:
@@ -132,7 +139,7 @@ class GaitGraph:
         if path.suffix != ".toml":
             known = tuple(sorted(file.stem for file in _FOLDER.glob("*.toml")))
             if str(name_or_path) not in known:
-                hint = "for a file of your own give its path, ending in .toml"
+                hint = "or give the path of a .toml file"
                 raise GaitshiftError(f"{known_names('graph', str(name_or_path), known)}; {hint}")
             path = _FOLDER / f"{name_or_path}.toml"
         with located(str(path)):
@@ -170,7 +177,7 @@ def _edge(data: object) -> Edge:
     table = Table(data, keys=("from", "to", "statistic", "priority", "alpha_over", *_RULE))
     when = table.text("when") if table.has("when") else "above"
     if when not in ("above", "below"):
-        raise GaitshiftError(f"'when' must be above or below, not {when!r}")
+        raise GaitshiftError(f"'when' must be above or below, got {when!r}")
     return Edge(
         source=table.text("from"),
         target=table.text("to"),
@@ -193,5 +200,5 @@ def _modulation(data: object) -> Modulation:
         table = Table(data, keys=("of", "points"))
         of = table.text("of")
         if of not in ("speed", "time"):
-            raise GaitshiftError(f"'of' must be speed or time, not {of!r}")
+            raise GaitshiftError(f"'of' must be speed or time, got {of!r}")
         return Modulation(of=of, points=table.points("points"))

@@ -25,13 +25,17 @@ class Modulation:
 
     def __post_init__(self) -> None:
         if self.of not in QUANTITIES:
-            raise GaitshiftError(f"α follows {' or '.join(QUANTITIES)}, not {self.of!r}")
+            raise GaitshiftError(f"α over: 'of' must be {' or '.join(QUANTITIES)}, got {self.of!r}")
         if not self.points or any(b[0] <= a[0] for a, b in pairwise(self.points)):
             raise GaitshiftError(
-                f"α over {self.of}: points as in [[0.4, 0.8], [1.2, 1.0]], {self.of}s rising"
+                f"α over {self.of}: points must be pairs with rising {self.of}s, such as "
+                f"[[0.4, 0.8], [1.2, 1.0]], got {list(map(list, self.points))}"
             )
         if not all(np.isfinite(x) and factor > 0 for x, factor in self.points):
-            raise GaitshiftError(f"α over {self.of}: factors must be positive")
+            raise GaitshiftError(
+                f"α over {self.of}: factors must be above 0 and {self.of}s finite, got "
+                f"{list(map(list, self.points))}"
+            )
 
     def factor(self, signals: Signals) -> Float[np.ndarray, " N"]:
         """Factor on each robot's α now."""

@@ -44,12 +44,12 @@ class Rule:
     def __post_init__(self) -> None:
         for name in ("alpha", "beta", "epsilon", "leak", "hold"):
             value: float = getattr(self, name)
-            lowest = "0 or more" if name in ("beta", "leak", "hold") else "positive"
+            lowest = "0 or more" if name in ("beta", "leak", "hold") else "above 0"
             good = value >= 0.0 if lowest == "0 or more" else value > 0.0
             if not (math.isfinite(value) and good):
-                raise GaitshiftError(f"{name} must be {lowest} and finite, not {value}")
+                raise GaitshiftError(f"{name} must be {lowest} and finite, got {value}")
         if self.when not in WHENS:
-            raise GaitshiftError(f"unknown rule {self.when!r}; rules are {', '.join(WHENS)}")
+            raise GaitshiftError(f"when must be {' or '.join(WHENS)}, got {self.when!r}")
 
     def count(
         self, values: Float[np.ndarray, "N M"], factor: Float[np.ndarray, " N"] | float = 1.0

@@ -58,7 +58,7 @@ class Signals:
         """
         value = getattr(self, name)
         if value is None:
-            raise GaitshiftError(f"'{by}' looks at the signal '{name}', which is missing")
+            raise GaitshiftError(f"'{by}' needs the signal '{name}', which is missing")
         return value
 
     def of(self, ids: Int[np.ndarray, " K"]) -> "Signals":

@@ -50,7 +50,7 @@ def check_positive(statistic: object, *names: str) -> None:
     for name in names:
         value: float = getattr(statistic, name)
         if not (math.isfinite(value) and value > 0.0):
-            raise GaitshiftError(f"{name} = {value:g}: a number above 0 would be right")
+            raise GaitshiftError(f"{name} must be a finite number above 0, got {value:g}")
 
 
 AnyStatistic = Statistic[Any]

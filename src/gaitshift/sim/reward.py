@@ -84,7 +84,7 @@ class RewardConfig:
     def __post_init__(self) -> None:
         if self.bonus_mode not in BONUS_MODES:
             raise GaitshiftError(
-                f"unknown bonus mode '{self.bonus_mode}'; known: {', '.join(BONUS_MODES)}"
+                f"bonus_mode must be one of {', '.join(BONUS_MODES)}, got '{self.bonus_mode}'"
             )
 
     @classmethod

@@ -54,7 +54,9 @@ class CpgController:
         """All n robots begin in the gait `start`."""
         unknown = [name for name in (*gaits, start) if name not in GAITS]
         if unknown:
-            raise GaitshiftError(f"no oscillators for '{unknown[0]}'; known: {', '.join(GAITS)}")
+            raise GaitshiftError(
+                f"gait of the oscillators must be one of {', '.join(GAITS)}, got '{unknown[0]}'"
+            )
         self.config = CpgConfig() if config is None else config
         self.network = HopfNetwork() if network is None else network
         self.gaits = tuple(gaits)

@@ -42,6 +42,6 @@ def load(name_or_path: str | Path) -> RewardMachine:
     if isinstance(name_or_path, Path) or name_or_path.endswith(".toml"):
         return read_toml(Path(name_or_path))
     if name_or_path not in names():
-        hint = "for a file of your own give its path, ending in .toml"
+        hint = "or give the path of a .toml file"
         raise GaitshiftError(f"{known_names('gait', name_or_path, names())}; {hint}")
     return read_toml(_FOLDER / f"{name_or_path}.toml")

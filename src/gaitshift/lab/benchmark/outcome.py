@@ -89,7 +89,7 @@ def _of_gait(outcomes: list[Outcome]) -> dict[str, Any]:
 
 def _truth(text: str) -> bool:
     if text not in ("True", "False"):
-        raise ValueError(f"'{text}': True or False would be right")
+        raise ValueError(f"must be True or False, got '{text}'")
     return text == "True"
 
 
@@ -124,6 +124,6 @@ def outcome_of(row: Row) -> Outcome:
     empty = [name for name, value in row.items() if value == ""]
     for name in empty:
         if name not in _MAY_BE_EMPTY:
-            raise GaitshiftError(f"the {name} of a training is missing")
+            raise GaitshiftError(f"column '{name}' must not be empty")
     values: Row = {**row, **dict.fromkeys(empty)}
     return Outcome(**values)

@@ -25,17 +25,20 @@ class SpeedConfig:
     robots: int = 128
     """Robots in parallel."""
     steps: int = 100
-    """Control steps a round."""
+    """Control steps per round."""
     terrain: str = "flat"
-    """Ground, as in `evaluate`."""
+    """Terrain, as in `evaluate`."""
     seed: int = 0
     """Seed of the actions."""
 
     def __post_init__(self) -> None:
         if not (1 <= self.robots <= 65536 and 1 <= self.steps <= 100_000):
-            raise GaitshiftError("bench: robots from 1 to 65536 and steps from 1 to 100000, please")
+            raise GaitshiftError(
+                f"robots must be 1 to 65536 and steps 1 to 100000, got {self.robots} "
+                f"and {self.steps}"
+            )
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
 
 
 def environment_speed(

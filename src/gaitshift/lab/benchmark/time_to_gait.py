@@ -50,16 +50,16 @@ class TimeToGait:
 
     def __post_init__(self) -> None:
         if not 1 <= self.seeds <= 100:
-            raise GaitshiftError(f"{self.seeds} seeds: 1 to 100 would be right")
+            raise GaitshiftError(f"seeds must be 1 to 100, got {self.seeds}")
         if self.first_seed < 0:
-            raise GaitshiftError(f"first seed {self.first_seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"first_seed must be 0 or larger, got {self.first_seed}")
         if not self.gaits:
-            raise GaitshiftError("no gait: trot, or another one, would be right")
+            raise GaitshiftError("gaits must name at least one gait, such as trot, got none")
         for name in self.gaits:
             gaits.load(name)
         if not 0 <= self.baseline_budget <= 86_400:
             raise GaitshiftError(
-                f"baseline budget of {self.baseline_budget} s: 0 to 86400 s would be right"
+                f"baseline_budget must be 0 to 86400 s, got {self.baseline_budget}"
             )
 
     @property
@@ -170,8 +170,8 @@ def _entries(config: TimeToGait) -> list[_Entry]:
         from gaitshift.lab.benchmark.baseline import Baseline
     except ImportError as error:
         raise GaitshiftError(
-            f"time-to-gait needs the package '{error.name}'; install gaitshift[train] and, unless "
-            "--baseline-budget is 0, stable-baselines3"
+            f"time-to-gait needs the package '{error.name}'; install gaitshift[train] and "
+            "stable-baselines3, or give --baseline-budget 0"
         ) from error
     baseline = _Entry(
         name=BASELINE,

@@ -67,7 +67,7 @@ def select(names: tuple[str, ...]) -> tuple[Course, ...]:
     known = tuple(course.name for course in COURSES)
     unknown = [name for name in names if name not in known]
     if unknown:
-        raise GaitshiftError(f"no course '{unknown[0]}'; courses are {', '.join(known)}")
+        raise GaitshiftError(f"course must be one of {', '.join(known)}, got '{unknown[0]}'")
     return tuple(course for course in COURSES if not names or course.name in names)
 
 

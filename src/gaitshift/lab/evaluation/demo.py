@@ -36,65 +36,65 @@ class DemoConfig:
     """What the demonstration shows."""
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
-    """The ground, piece by piece with lengths in metres; pieces as in `evaluate --terrain`."""
+    """Terrain: pieces with lengths in metres; see `evaluate --terrain` for pieces."""
     flat_gait: str = "trot"
-    """The gait on flat ground, and at the start."""
+    """Gait on flat ground and at the start."""
     rough_gait: str = "bound"
-    """The gait on rough ground."""
+    """Gait on rough ground."""
     condition: str = "touchdown_surprise"
-    """When to shift, by name: `touchdown_surprise`, which slopes and steps do not deceive;
-    `height_difference`, the paper's statistic with numbers of ours; `paper`, with its own."""
+    """Shift condition: `touchdown_surprise`, which does not fire on slopes and steps;
+    `height_difference`, the paper's statistic with our settings; `paper`, with the paper's."""
     alpha: float | None = None
-    """α: above it counts as rough [m]; the condition's own by default, as the numbers below."""
+    """α: values above it count as rough [m]; as for the settings below, the default is that of
+    the condition."""
     beta: float | None = None
     """β: shift to the rough gait when k exceeds it [counts]."""
     leak: float | None = None
-    """What k loses in each step [counts]."""
+    """Leak: decrease of k per step [counts]."""
     alpha_back: float | None = None
-    """α': all below it counts as flat [m]."""
+    """α': values below it count as flat [m]."""
     beta_back: float | None = None
     """β': shift back when k exceeds it [counts]."""
     hold: float | None = None
-    """Least time in either gait [s]."""
+    """Least time in a gait between two shifts [s]."""
     controller: Literal["policy", "cpg"] = "policy"
-    """What walks: trained policies, or coupled oscillators that learned nothing (trot, pace, bound,
-    walk), which go slowly and for low noise alone."""
+    """Controller: trained policies, or coupled oscillators without learning (trot, pace, bound,
+    walk), which are slow and only cross low noise."""
     graph: str = ""
-    """A gait graph in place of the two gaits and their condition: a shipped one by name, or a
-    TOML file."""
+    """Gait graph, in place of the two gaits and the condition: a shipped graph or a .toml file."""
     gaits: tuple[str, ...] = ()
-    """Gaits to show in a row instead, on a schedule and without the condition."""
+    """Gaits to show in sequence on a schedule, in place of the condition."""
     every: float = 3.0
-    """Seconds from one of `gaits` to the next."""
+    """Time between two shifts of `gaits` [s]."""
     at: tuple[float, ...] = ()
-    """Times of the shifts to the second of `gaits` and on [s], in place of `every`."""
+    """Times of the shifts between `gaits` [s], in place of `every`."""
     episodes: int = 1
-    """Robots, each on a track and with a start of its own; pictures show the first."""
+    """Number of robots, each with its own track and start; pictures show robot 0."""
     seed: int = 0
-    """Seed of the first track and start; the next robots have the next seeds."""
+    """Seed of the track and start of robot 0; robot i uses seed + i."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 1000:
-            raise GaitshiftError(f"{self.episodes} episodes: 1 to 1000 would be right")
+            raise GaitshiftError(f"episodes must be 1 to 1000, got {self.episodes}")
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if not 0.2 <= self.every <= 60:
-            raise GaitshiftError(f"a gait every {self.every} s: 0.2 to 60 s would be right")
+            raise GaitshiftError(f"every must be 0.2 to 60 s, got {self.every}")
         given = [name for name in _NUMBERS if getattr(self, name) is not None]
         if self.graph and given:
             raise GaitshiftError(
-                f"a graph has its own numbers: change {given[0]} in its file, or leave --graph out"
+                f"{given[0]} must not be given with a graph; change it in the graph's file"
             )
         if len(self.gaits) == 1:
-            raise GaitshiftError("one gait alone has nothing to shift to; give two or more")
+            raise GaitshiftError(f"gaits must name two gaits or more, got {self.gaits[0]} alone")
 
         if self.at and len(self.at) != len(self.gaits) - 1:
             raise GaitshiftError(
-                f"{len(self.at)} times for {len(self.gaits)} gaits: {len(self.gaits) - 1} "
-                "would be right, one for each shift"
+                f"at must give {max(0, len(self.gaits) - 1)} times for {len(self.gaits)} gaits, "
+                f"one for each shift, got {len(self.at)}"
             )
         if any(late <= early for early, late in pairwise((0.0, *self.at))):
-            raise GaitshiftError("the times of the shifts must be positive and rising")
+            raise GaitshiftError(f"at must give rising times above 0 s, got {list(self.at)}")
 
     @property
     def shift_times(self) -> tuple[float, ...]:

@@ -38,36 +38,38 @@ class EvaluationConfig:
     """What a policy is put through."""
 
     terrain: str = "flat"
-    """Spec of the ground: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a
-    track."""
+    """Terrain: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a track of
+    pieces with lengths, such as flat@8,perlin:0.10@12."""
     episodes: int = 256
-    """Robots, each running one episode, all at once."""
+    """Number of robots; each runs one episode."""
     seconds: float = 10.0
     """Length of an episode [s]."""
     speed: float | None = None
-    """Commanded forward speed [m/s]; the gait's own by default."""
+    """Commanded forward speed [m/s]; by default the gait's nominal speed."""
     stride_frequency: float | None = None
-    """Commanded stride frequency [Hz]; the gait's own by default."""
+    """Commanded stride frequency [Hz]; by default the gait's nominal frequency."""
     open_loop: bool = False
-    """Ask the policy for the speed as it is; by default a slow loop trims what is asked for, so
-    that the mean speed is the commanded one."""
+    """Give the policy the commanded speed directly; by default a slow speed loop adjusts it so that
+    the mean speed equals the commanded speed."""
     push: float = 0.0
-    """Largest push on the base, 0.2 s long, every 2 s [N]."""
+    """Largest push on the base [N]; a push lasts 0.2 s and comes every 2 s."""
     seed: int = 0
-    """Seed of grounds, starting noise and pushes."""
+    """Seed of terrains, starts and pushes."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 100_000:
-            raise GaitshiftError(f"{self.episodes} episodes: 1 to 100000 would be right")
+            raise GaitshiftError(f"episodes must be 1 to 100000, got {self.episodes}")
         if not 0 < self.seconds <= 3600:
-            raise GaitshiftError(f"{self.seconds} seconds: more than 0, up to 3600 would be right")
+            raise GaitshiftError(f"seconds must be above 0 and at most 3600, got {self.seconds}")
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if self.speed is not None and not 0 <= self.speed <= MOST_SPEED:
-            raise GaitshiftError(f"{self.speed} m/s: 0 to {MOST_SPEED:g} m/s would be right")
+            raise GaitshiftError(f"speed must be 0 to {MOST_SPEED:g} m/s, got {self.speed}")
         frequency, most = self.stride_frequency, 1 / CONTROL_PERIOD
         if frequency is not None and not 0 < frequency <= most:
-            raise GaitshiftError(f"{frequency} Hz: more than 0, up to {most:g} Hz would be right")
+            raise GaitshiftError(
+                f"stride_frequency must be above 0 and at most {most:g} Hz, got {frequency}"
+            )
 
 
 def evaluate(
@@ -183,7 +185,7 @@ def _check_length(ground: Terrain, spec: str, *, speed: float, seconds: float) -
     needed = RUN_UP + asked + max(MARGIN * asked, LEAST_MARGIN)
     if not ground.is_flat and ground.size[0] < needed - 1e-6:
         raise GaitshiftError(
-            f"terrain {spec!r} is {ground.size[0]:g} m long, too short for {seconds:g} s at "
-            f"{speed:g} m/s: {ceil(needed)} m or more would be right ({RUN_UP:g} m of them behind "
-            "the start), or fewer seconds"
+            f"terrain {spec!r}: length must be {ceil(needed)} m or more for {seconds:g} s at "
+            f"{speed:g} m/s, {RUN_UP:g} m of it behind the start, got {ground.size[0]:g} m; give a "
+            "longer terrain or fewer seconds"
         )

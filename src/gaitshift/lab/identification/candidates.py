@@ -101,14 +101,14 @@ CANDIDATES = (
         low_back=0.001,
         high=0.5,
         leaks=_six(_LEAKS),
-        note="differences of foot heights along the vertical; a leak may be chosen",
+        note="differences of foot heights along gravity, with a leak",
     ),
     _watching(
         PlaneResidual(),
         "plane_residual",
         low=0.002,
         high=0.2,
-        note="two touches a foot about their plane",
+        note="residual of the last two touches of each foot about their plane",
     ),
     _watching(
         TouchdownSurprise(),
@@ -116,7 +116,7 @@ CANDIDATES = (
         low=0.005 / 20 ** (50 / 99),  # 1.1 mm, in the steps of 100 values from 5 mm to 10 cm
         high=0.1,
         count=150,
-        note="how new touches change about the plane of the earlier ones",
+        note="change of new touches about the plane of earlier ones",
     ),
     _watching(
         AttitudeVariance(),
@@ -131,7 +131,7 @@ CANDIDATES = (
         low=0.005,
         high=0.5,
         leaks=_six(_LEAKS),
-        note="strides shorter or longer than asked for",
+        note="stride duration minus commanded stride duration",
     ),
     _watching(
         Slip(),
@@ -139,21 +139,21 @@ CANDIDATES = (
         low=0.02,
         high=2.0,
         leaks=_six(_LEAKS),
-        note="speed of feet that ought to stand",
+        note="speed of feet in contact",
     ),
     _watching(
         CostOfTransport(),
         "cost_of_transport",
         low=0.1,
         high=10.0,
-        note="power over weight and speed",
+        note="cost of transport: power over weight and speed",
     ),
     _watching(
         ValueDrop(),
         "value_drop",
         low=0.01,
         high=100.0,
-        note="the critic expects less than it did",
+        note="drop of the critic's value",
     ),
     _watching(
         Oracle(),
@@ -161,7 +161,7 @@ CANDIDATES = (
         low=0.4,
         high=0.6,
         leaks=(0.0,),
-        note="sees the ground: a point of reference",
+        note="knows the ground: the reference",
     ),
 )
 """A new one is an entry here."""
@@ -177,5 +177,5 @@ def candidates(names: Sequence[str]) -> tuple[Candidate, ...]:
     unknown = [name for name in names if name not in known]
     if unknown:
         listed = ", ".join((*known, "classifier"))
-        raise GaitshiftError(f"no condition '{unknown[0]}'; known: {listed}, or all")
+        raise GaitshiftError(f"condition must be one of {listed}, or all, got '{unknown[0]}'")
     return tuple(known[name] for name in dict.fromkeys(names))

@@ -67,10 +67,12 @@ def _best(leak: float, tally: Tally, grid: Grid, when: Literal["above", "below"]
     back = when == "below"
     if not tally.came.any():
         ground = "rough ground that ends" if back else "rough ground"
-        raise GaitshiftError(f"no {ground} in the recordings: nothing to detect")
+        raise GaitshiftError(f"the recordings must contain {ground} to detect, got none")
     if not tally.km.any():
         ground = "rough" if back else "smooth"
-        raise GaitshiftError(f"no {ground} ground in the recordings: nothing to keep still on")
+        raise GaitshiftError(
+            f"the recordings must contain {ground} ground to count false shifts on, got none"
+        )
     cost = _cost(tally)
     free = _free(tally, grid, when)
     rate = tally.false_per_km
@@ -89,7 +91,7 @@ def _best(leak: float, tally: Tally, grid: Grid, when: Literal["above", "below"]
 def _together(by_name: Mapping[str, Tally]) -> Tally:
     tallies = list(by_name.values())
     if not tallies:
-        raise GaitshiftError("no recordings to choose by")
+        raise GaitshiftError("there must be recordings to choose the settings by, got none")
     whole = Tally(shape=tallies[0].shape)
     for tally in tallies:
         whole.join(tally)

@@ -84,7 +84,9 @@ class RoughnessClassifier:
                 features[half].append(seen[kept, robot])
                 labels[half].append(rough[kept, robot])
         if not (features[0] and features[1]):
-            raise GaitshiftError("a classifier needs two robots, or several passages of one")
+            raise GaitshiftError(
+                "a classifier needs two robots or more, or several passages of one"
+            )
         models = tuple(
             _fitted(np.concatenate(x), np.concatenate(y))
             for x, y in zip(features, labels, strict=True)
@@ -113,7 +115,7 @@ class RoughnessClassifier:
             name=NAME,
             low=0.02,
             high=0.999,
-            note="gradient boosting on all of these signals: an upper bound",
+            note="gradient boosting on all signals: the upper bound",
             values=lambda recording: self.probability(recording, crosswise=crosswise),
         )
 
@@ -149,7 +151,9 @@ def _features(
 def _fitted(x: Float[np.ndarray, "K F"], y: Bool[np.ndarray, " K"]) -> Any:
     if y.all() or not y.any():
         kind = "rough" if y.all() else "smooth"
-        raise GaitshiftError(f"all labels are {kind}: a classifier needs rough and smooth ground")
+        raise GaitshiftError(
+            f"a classifier needs labels of rough and smooth ground, got {kind} only"
+        )
     model: Any = HistGradientBoostingClassifier(random_state=_SEED, class_weight="balanced")
     with threadpool_limits(1):
         model.fit(x, y)

@@ -33,7 +33,7 @@ def first_firings(
     """
     for name, grid in (("α", alphas), ("β", betas)):
         if len(grid) == 0 or np.any(np.diff(grid) <= 0.0):
-            raise GaitshiftError(f"the grid of {name} must have rising values")
+            raise GaitshiftError(f"grid values of {name} must rise")
     steps, robots, _ = values.shape
     first = np.empty((robots, len(alphas), len(betas)), dtype=np.int32)
     last = steps_alive(alive)

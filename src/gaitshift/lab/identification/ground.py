@@ -43,7 +43,9 @@ def is_rough(
         try:
             counts = float(number) >= LEAST_AMPLITUDE
         except ValueError:
-            raise GaitshiftError(f"ground '{section.name}': its number cannot be read") from None
+            raise GaitshiftError(
+                f"terrain '{section.name}': the part after ':' must be a number, got '{number}'"
+            ) from None
         if counts:
             rough |= (x >= section.x0) & (x < section.x1)
     return rough

@@ -129,7 +129,8 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[Recording]) -> Rep
             name, rule = one.candidate.name, one.rule
             if missing := one.candidate.missing(recording):
                 raise GaitshiftError(
-                    f"{recording.name} lacks signals of '{name}': it needs {', '.join(missing)}"
+                    f"{recording.name} lacks signals; the condition '{name}' needs "
+                    f"{', '.join(missing)}"
                 )
             values = one.candidate.values(recording)
             seen, faced = facing(recording, values, one.way)
@@ -157,7 +158,7 @@ def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
         GaitshiftError: there was no recording.
     """
     if not replayed.seconds:
-        raise GaitshiftError("no recordings to judge by")
+        raise GaitshiftError("there must be recordings to judge by, got none")
     return [
         Judged(
             tuned=one,

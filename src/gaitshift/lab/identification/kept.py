@@ -43,7 +43,7 @@ class Kept:
         """
         key = (self._code, name, *depends_on)
         known = self._step.check_call_in_cache(work, key)
-        self._report(f"{name} (kept)" if known else name)
+        self._report(f"{name} (cached)" if known else name)
         return self._step(work, key)
 
 

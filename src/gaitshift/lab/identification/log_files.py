@@ -65,7 +65,7 @@ def check_sources(paths: Sequence[Path]) -> None:
             raise GaitshiftError(f"no log file {path}")
         if path.suffix not in (".npz", *STREAMED):
             raise GaitshiftError(
-                f"{path}: a log ends in .npz, or is a table in {' or '.join(STREAMED)}"
+                f"{path}: the name of a log must end in .npz, {' or '.join(STREAMED)}"
             )
 
 
@@ -84,7 +84,7 @@ def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[Recording]
         log = Log.load(path)
         if not log.contact.any():
             raise GaitshiftError(
-                f"{path}: no foot ever touches; 'contact' is true where one is down"
+                f"{path}: 'contact' must be true where a foot is down, got no contact at all"
             )
         yield Recording.from_log(log, _SEED.sub("", path.stem), rough_ground(log))
 
@@ -122,10 +122,13 @@ def passages(path: Path, way: Way = "rough") -> Iterator[Recording]:
             start = end
         columns = {name: [values[start:]] for name, values in whole.items()}
     if rows < 2:
-        there = "there are no rows" if rows == 0 else "there is one row alone"
-        raise GaitshiftError(f"{path}: {there} in it; a row a control step would be right")
+        raise GaitshiftError(
+            f"{path}: must have two rows or more, one for each control step, got {rows}"
+        )
     if not touched:
-        raise GaitshiftError(f"{path}: no foot ever touches; contacts are 1 where a foot is down")
+        raise GaitshiftError(
+            f"{path}: contact columns must be 1 where a foot is down, got no contact at all"
+        )
     whole = {name: np.concatenate(parts) for name, parts in columns.items()}
     if len(whole["time"]) > 1:
         yield _recording(path, whole, slice(0, len(whole["time"])))
@@ -136,12 +139,12 @@ def _check_columns(path: Path, batch: dict[str, np.ndarray]) -> None:
     if missing:
         legs = ", ".join(LEGS)
         raise GaitshiftError(
-            f"{path} lacks the column '{missing[0]}'; it takes time, rough, contact_LEG and "
+            f"{path} lacks the column '{missing[0]}'; a table needs time, rough, contact_LEG and "
             f"foot_LEG_x, _y, _z for the legs {legs}"
         )
     if not any(all(name in batch for name in names) for names in ATTITUDES):
         raise GaitshiftError(
-            f"{path} lacks the attitude: gravity_x, gravity_y, gravity_z, or roll and pitch"
+            f"{path} lacks the attitude; a table needs gravity_x, _y, _z, or roll and pitch"
         )
 
 
@@ -152,27 +155,29 @@ def _check_values(
     for name, values in batch.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
-            raise GaitshiftError(f"{path}: row {rows + bad[0] + 1}, '{name}' is not a number")
+            raise GaitshiftError(
+                f"{path}: row {rows + bad[0] + 1}, '{name}' must be a finite number"
+            )
     apart = np.diff(batch["time"], prepend=before)
     wrong = np.flatnonzero(apart <= 0)
     if wrong.size:
         raise GaitshiftError(
-            f"{path}: row {rows + wrong[0] + 1}, time does not rise; rows must be in order, each "
-            "time once"
+            f"{path}: row {rows + wrong[0] + 1}, 'time' must rise from row to row, got "
+            f"{apart[wrong[0]]:.4g} s after the row before"
         )
     if np.isnan(period):
         known = apart[np.isfinite(apart)]
         period = float(known[0]) if known.size else np.nan
         if known.size and not LEAST_PERIOD <= period <= MOST_PERIOD:
             raise GaitshiftError(
-                f"{path}: rows are {period:.4g} apart in 'time'; it is in seconds, and "
-                f"{LEAST_PERIOD:g} to {MOST_PERIOD:g} s would be right"
+                f"{path}: rows must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s apart in 'time', got "
+                f"{period:.4g}; the unit is seconds"
             )
     changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
     if changed.size:
         raise GaitshiftError(
-            f"{path}: row {rows + changed[0] + 1} comes {apart[changed[0]]:.4g} s after the one "
-            f"before, the first ones {period:.4g} s: one rate throughout would be right"
+            f"{path}: rows must be equally spaced in 'time', got {period:.4g} s at first and "
+            f"{apart[changed[0]]:.4g} s before row {rows + changed[0] + 1}"
         )
     return period
 
@@ -190,15 +195,15 @@ def _down(path: Path, batch: dict[str, np.ndarray], rows: int, before: float) ->
         none = np.flatnonzero(length < _LEAST_GRAVITY)
         if none.size:
             raise GaitshiftError(
-                f"{path}: row {rows + none[0] + 1}, gravity_x, _y, _z are 0 and point nowhere; "
-                "(0, 0, -1) when level would be right"
+                f"{path}: row {rows + none[0] + 1}, gravity_x, _y, _z must be a direction, (0, 0, "
+                "-1) on level ground, got 0, 0, 0"
             )
     down = float(_gravity(batch)[:, 2].sum())
     if before + down > 0.0:
-        right = "gravity_z = -1" if names is vector else "roll = pitch = 0 rad"
+        right = "gravity_z -1" if names is vector else "roll and pitch 0 rad"
         raise GaitshiftError(
-            f"{path}: by {', '.join(names)} gravity points up on average; {right} when level "
-            "would be right"
+            f"{path}: {', '.join(names)} must point gravity down, {right} on level ground, got "
+            "gravity up on average"
         )
     return down
 

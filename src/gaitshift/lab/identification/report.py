@@ -67,36 +67,37 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
     """Heading of a report, and how its numbers were chosen and judged."""
     tuned = judged[0].tuned
     who = (
-        "They were chosen on some logs and judged on others."
+        "The settings were chosen on some logs and judged on others."
         if held_out
-        else "The same logs chose and judged them, so the figures flatter."
+        else "The same logs were used to choose and to judge, so the figures are optimistic."
     )
     how = (
-        "Each condition was replayed at the numbers that were given."
+        "Each condition was replayed with the given α, β and leak."
         if tuned.choice.is_free is None
-        else "Each condition was replayed over α, β and leaks; chosen was the soonest that never "
-        f"shifts where it should not, even at a β smaller by a fifth. {who}"
+        else "Each condition was replayed over a grid of α, β and leak. The chosen setting has the "
+        "shortest delay among those without a false shift, also with a β smaller by a fifth. "
+        f"{who}"
     )
     stand_in = shipped_rule(back=tuned.way == "rough")
     other = "back" if tuned.way == "rough" else "there"
     return _TITLES[tuned.way], (
-        f"{how} A step is {1000 * CONTROL_PERIOD:g} ms where the logs do not say otherwise. β in "
-        "time and distance: until k exceeds it where all values lie beyond α, at the robots' mean "
-        f"speed. Area: under the ROC curve of passages of {LENGTH:g} m, of the hardest course, at "
-        f"{_area_words(tuned.choice)}. Chattered: robots that would have shifted more than once "
-        f"there and once back for each rough stretch, had they taken the shipped way {other} "
-        f"({SHIPPED}'s: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak {stand_in.leak:g}); the "
-        "gait of the logs stayed. Intervals are of 95 %."
+        f"{how} A control step is {1000 * CONTROL_PERIOD:g} ms unless a log has another. β [s] and "
+        "β [m] are the shortest time until k exceeds β, with all values beyond α, and the distance "
+        f"at the mean speed. Area is that under the ROC curve of passages of {LENGTH:g} m on the "
+        f"hardest course, at {_area_words(tuned.choice)}. Chattered counts the robots with more "
+        "than one shift there and one back for each rough stretch, with the shipped rule for the "
+        f"way {other} ({SHIPPED}: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak "
+        f"{stand_in.leak:g}). Robots kept the gait of the logs. Intervals are 95 %."
     )
 
 
 def _area_words(choice: Choice) -> str:
     """The β of the areas, and why it is another."""
     if choice.is_free is None:
-        return "the β that was given; none where k cannot exceed it within a passage"
+        return "the given β (no area where k cannot exceed it within a passage)"
     return (
-        "the β that told passages apart best on the logs that chose, as k may not reach the chosen "
-        "one within a passage"
+        "the β with the largest area on the logs for choosing (k may not reach the chosen β within "
+        "a passage)"
     )
 
 
@@ -180,13 +181,13 @@ def _readme(
     parts = [
         f"# {title}",
         words,
-        f"Made by `{command}`. [As a page](page.html) to hover over and zoom into.",
-        "## Side by side",
+        f"Made by `{command}`. The same as an [interactive page](page.html).",
+        "## All conditions",
     ]
     parts.append(table.markdown(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
     parts += [
-        f"No setting of {one.tuned.candidate.name} keeps still on all of the smooth ground that "
-        "chose: the one with the fewest false shifts a kilometre was taken."
+        f"No setting of {one.tuned.candidate.name} is free of false shifts on the logs for "
+        "choosing; the setting with the fewest false shifts per kilometre is shown."
         for one in judged
         if one.tuned.choice.is_free is False
     ]

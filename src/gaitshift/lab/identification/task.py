@@ -47,15 +47,17 @@ class Task:
 
     def __post_init__(self) -> None:
         if self.everything and self.numbers is not None:
-            raise GaitshiftError("α has another unit in each condition: name those for --alpha")
+            raise GaitshiftError(
+                "--alpha must be given with named conditions, not with all: its unit differs"
+            )
         _ = self.wanted  # every name is known
         check_sources((*self.logs, *self.held_out))
         choosing = {path.resolve() for path in self.logs}
         for path in self.held_out:
             if path.resolve() in choosing:
                 raise GaitshiftError(
-                    f"{path} is given twice, to choose the numbers and with --held-out; logs of "
-                    "other seeds would be right"
+                    f"{path}: a log must not both choose settings and be --held-out; give logs of "
+                    "other seeds"
                 )
 
     @property
@@ -110,7 +112,7 @@ class Task:
         except GaitshiftError as error:
             if not self.everything:
                 raise
-            report(f"{error}; it is left out")
+            report(f"{error}; the classifier is skipped")
             return None
 
     def _tuned(
@@ -132,7 +134,9 @@ class Task:
         left_out = [name for name in names if name not in found]
         if left_out and not self.everything:
             lacks = ", ".join(tried.lacking[left_out[0]])
-            raise GaitshiftError(f"the logs lack the signals of '{left_out[0]}': it needs {lacks}")
+            raise GaitshiftError(
+                f"the logs lack signals; the condition '{left_out[0]}' needs {lacks}"
+            )
         return tuned
 
 

@@ -142,9 +142,9 @@ def tune(candidates: Sequence[Candidate], tried: Tried) -> list[Tuned]:
     if not found:
         needs = "; ".join(f"'{name}' needs {', '.join(of)}" for name, of in tried.lacking.items())
         raise GaitshiftError(
-            f"the logs lack the signals of every condition that was asked for: {needs}"
+            f"the logs lack the signals of all these conditions: {needs}"
             if needs
-            else "no recordings to choose by"
+            else "there must be recordings to choose the settings by, got none"
         )
     return found
 

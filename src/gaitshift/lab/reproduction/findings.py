@@ -73,14 +73,14 @@ def findings(results: Results) -> list[Finding]:
 def _all_come_out(gaits: dict[str, Seeds]) -> Finding:
     told = [
         f"{gait} in {seeds.walking} of {len(seeds)} seeds ({_number(seeds.late('speed'), '.2f')}"
-        f" m/s, {_number(seeds.late('reward'), '.1f')} reward a step)"
+        f" m/s, reward {_number(seeds.late('reward'), '.1f')} per step)"
         for gait, seeds in gaits.items()
     ]
     walking = sum(seeds.walking for seeds in gaits.values())
     return Finding(
         name="three gaits",
-        paper="All three gaits come out in about 500 iterations (IV-B).",
-        measured=f"At the end robots walk: {', '.join(told)}.",
+        paper="All three gaits are learned in about 500 iterations (IV-B).",
+        measured=f"Runs that walk at the end: {', '.join(told)}.",
         verdict=_grade(walking, sum(map(len, gaits.values()))),
     )
 
@@ -91,8 +91,8 @@ def _learned_early(gaits: dict[str, Seeds]) -> Finding:
     verdict: Verdict = "does not hold" if early == 0 else "holds in part"
     return Finding(
         name="learned early",
-        paper=f"In most cases {LEARNED_BY} iterations are enough for the right movements (IV-B).",
-        measured=f"{early} of {len(starts)} runs walk from iteration {LEARNED_BY} or before.",
+        paper=f"Most runs need {LEARNED_BY} iterations for the right movements (IV-B).",
+        measured=f"{early} of {len(starts)} runs walk by iteration {LEARNED_BY}.",
         verdict="holds" if early > len(starts) / 2 else verdict,
     )
 
@@ -103,8 +103,8 @@ def _order(gaits: dict[str, Seeds]) -> Finding:
     in_order = [a < b for a, b in pairwise(first)]
     return Finding(
         name="order",
-        paper="Trot is learned first, bound comes next, pace takes longest (IV-B).",
-        measured=f"The median run walks from iteration: {', '.join(told)}.",
+        paper="Trot is learned first, then bound, then pace (IV-B).",
+        measured=f"Iteration from which the median run walks: {', '.join(told)}.",
         verdict=_grade(sum(in_order), len(in_order)),
     )
 
@@ -130,14 +130,14 @@ def _curves(gaits: dict[str, Seeds]) -> Finding:
     return Finding(
         name="reward curves",
         paper=(
-            f"Rewards start near {START:g} a step, cross zero near iteration "
+            f"Rewards start near {START:g} per step, cross zero near iteration "
             f"{', '.join(f'{n} ({gait})' for gait, n in ZERO_CROSSING.items())}, and end at "
             f"{PLATEAU[0]:g} to {PLATEAU[1]:g} (read off Fig. 1)."
         ),
         measured=(
-            f"{text[0].upper()}{text[1:]}. {sum(near)} of these {len(near)} figures are near the "
-            f"paper's: within {START_WITHIN:g} a step at the start and {PLATEAU_WITHIN:g} at the "
-            f"end, and a factor of {CROSSING_WITHIN:g} at the crossing."
+            f"{text[0].upper()}{text[1:]}. {sum(near)} of these {len(near)} values are close to "
+            f"the paper's: within {START_WITHIN:g} per step at the start, {PLATEAU_WITHIN:g} at "
+            f"the end, and a factor of {CROSSING_WITHIN:g} at the crossing."
         ),
         verdict=_grade(sum(near), len(near)),
     )
@@ -179,20 +179,20 @@ _COMPARISONS = {
         _works_as_printed,
     ),
     "lock-out": (
-        "The machine's order of contacts is all that a gait takes: no least time between two "
-        "changes is named (III-C).",
+        "The order of contacts alone defines a gait: the paper names no least time between two "
+        "changes (III-C).",
         "lockout-0",
         _walks_without_lockout,
     ),
     "observation": (
-        "The policy sees the machine's state u and the steps δ since it changed: over S × U the "
-        "reward is Markov again (III-B, III-C).",
+        "The policy observes the machine's state u and the steps δ since it changed, so that the "
+        "reward is Markov over S × U (III-B, III-C).",
         "blind",
         _is_needed,
     ),
     "machine": (
-        "Reward machines make learning a good deal faster, and keep robots from standing still "
-        "(III-D, IV-B).",
+        "Reward machines make learning much faster and keep robots from standing still (III-D, "
+        "IV-B).",
         "no-bonus",
         _speeds_up,
     ),
@@ -202,7 +202,7 @@ _COMPARISONS = {
         "curriculum",
         _is_spared,
     ),
-    "gains": ("Joints are held with Kp = 3 and Kd = 0.2 (IV-A).", "paper-gains", _works_as_printed),
+    "gains": ("Joint gains are Kp = 3 and Kd = 0.2 (IV-A).", "paper-gains", _works_as_printed),
 }
 """Of each group: the statement, the setting that decides on it, and the judge of the reference and
 that setting."""
@@ -212,12 +212,12 @@ def _told(label: str, seeds: Seeds) -> str:
     """How many walk, how many are as fast in any gait, and from when, by the median."""
     text = (
         f"**{label}** {seeds.walking} of {len(seeds)} walk "
-        f"({_median(seeds.walk_from)}), {seeds.moving} are as fast in any gait "
+        f"({_median(seeds.walk_from)}), {seeds.moving} reach that speed in any gait "
         f"({_median(seeds.move_from)}); at the end {_number(seeds.late('speed'), '.2f')} m/s, "
-        f"{_number(seeds.late('changes_per_s'), '.1f')} changes a second"
+        f"{_number(seeds.late('changes_per_s'), '.1f')} state changes per second"
     )
     broken = sum(seeds.broken)
-    return f"{text}; {broken} broke down" if broken else text
+    return f"{text}; {broken} diverged" if broken else text
 
 
 def _grade(good: int, of: int) -> Verdict:

@@ -58,7 +58,7 @@ class Plan:
 
     def __post_init__(self) -> None:
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
 
     @classmethod
     def tiny(cls, seed: int = 0) -> "Plan":
@@ -97,7 +97,7 @@ class Plan:
         known = (PAPER, *GAITS, *dict.fromkeys(groups.values()), *groups)
         unknown = [name for name in only if name not in known]
         if unknown:
-            raise GaitshiftError(f"nothing called '{unknown[0]}'; known: {', '.join(known)}")
+            raise GaitshiftError(f"only must name some of {', '.join(known)}, got '{unknown[0]}'")
         compared = any(name in groups or name in groups.values() for name in only)
         return tuple(
             job

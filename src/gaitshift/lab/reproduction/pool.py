@@ -51,7 +51,7 @@ def train_all(
             report(sum(_new_iterations(job, runs, before) for job in left), total)
     except BrokenProcessPool:
         raise GaitshiftError(
-            "a training process was killed (out of memory?); the same command goes on"
+            "a training process was killed, perhaps out of memory; run the same command to resume"
         ) from None
     finally:
         for process in multiprocessing.active_children():

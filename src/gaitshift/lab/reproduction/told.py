@@ -50,7 +50,7 @@ class Told:
             job = jobs[key]
             if row.get("recipe") != fingerprint(job):
                 raise GaitshiftError(
-                    f"{out / RUNS} tells of {job.name} with another recipe; give another --out, or "
+                    f"{out / RUNS} has {job.name} with another recipe; give another --out, or "
                     "leave out --add to train it again"
                 )
             names[key] = job.name
@@ -66,7 +66,10 @@ class Told:
         for key, name in names.items():
             whole = jobs[key].recipe.iterations
             if name not in broken and len(courses.get(name, ())) != whole:
-                raise GaitshiftError(f"{out / CURVES}: {whole} lines of {name} would be right")
+                raise GaitshiftError(
+                    f"{out / CURVES} must have {whole} lines of {name}, got "
+                    f"{len(courses.get(name, ()))}"
+                )
         judged = dict(_rows(out / GAITS)) if (out / GAITS).is_file() else {}
         return cls(
             courses=courses,

@@ -86,15 +86,15 @@ def page(rows: Sequence[Row], command: str) -> str:
         "chattered",
     )
     parts = [
-        "# Does the shift help?",
-        f"Robots cross {BEFORE:g} m of level ground, {NOISE:g} m of Perlin noise of an amplitude, "
-        f"and {AFTER:g} m of level ground: in one gait, in the other, shifted by a condition, or "
-        "by an oracle that sees where the noise is. The fields and the starts are the same for "
-        "all. Survived: did not fall before the finish. Arrived: was there within "
-        f"{PATIENCE:g} times the time that the command takes. Distance and speed are of all "
-        "robots, until they fell too; CoT of those that came a metre or more. Chattered: shifted "
-        f"more than {ENOUGH} times, which is once there and once back. Intervals are of 95 %, "
-        "those of shares Wilson's.",
+        "# Does the shift help on rough ground?",
+        f"Robots cross {BEFORE:g} m of level ground, {NOISE:g} m of Perlin noise of one amplitude "
+        f"and {AFTER:g} m of level ground: in one gait, in the other, with shifts by a condition, "
+        "or with shifts by an oracle that knows where the noise is. Fields and starts are the same "
+        "for all. Survived: no fall before the finish. Arrived: at the finish within "
+        f"{PATIENCE:g} times the time at the commanded speed. Distance and speed are means over "
+        "all robots, up to the fall of those that fell; CoT is over robots that walked at least "
+        f"1 m. Chattered: more than {ENOUGH} shifts (one there and one back). Intervals are 95 %, "
+        "Wilson intervals for shares.",
         f"Made by `{command}`.",
         f"![Survival, distance, speed and cost of transport over the amplitude]({PICTURE})",
     ]

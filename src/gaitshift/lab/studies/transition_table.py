@@ -30,13 +30,13 @@ COLUMNS: dict[str, type] = {
 }
 """Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
 
-_INTRODUCTION = """# Shifts in an instant
+_INTRODUCTION = """# Gait shifts at a random phase
 
-Policy and machine are swapped at an instant drawn from a whole stride of the old gait. A shift
-succeeds when the robot does not fall within 5 s and every stride from some moment on shows the new
-gait for half of its steps or more; settle time: until the first such stride is over. Dip: how far
-the mean speed of a stride falls below the slower of the two commands. Intervals are Wilson's, of
-95 %."""
+Policy and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds
+if the robot does not fall within 5 s and, from some stride on, the contacts match the new gait in
+at least half of the steps of every stride. Settle time ends with the first such stride. Dip is the
+largest drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 %
+Wilson intervals."""
 
 HEAD = (
     "from",
@@ -84,7 +84,7 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
 
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
-    parts = [_INTRODUCTION, f"Made by `{command}`. [As a page](page.html) to hover over."]
+    parts = [_INTRODUCTION, f"Made by `{command}`. The same as an [interactive page](page.html)."]
     for ground in dict.fromkeys(row["ground"] for row in rows):
         of = [row for row in rows if row["ground"] == ground]
         total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))

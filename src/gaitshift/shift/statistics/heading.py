@@ -34,7 +34,9 @@ class HeadingWatch:
 
     def __post_init__(self) -> None:
         if not self.limit > 0.0 or not self.frequency > 0.0:
-            raise GaitshiftError("limit and frequency of a heading watch are above 0")
+            raise GaitshiftError(
+                f"limit and frequency must be above 0, got {self.limit:g} and {self.frequency:g}"
+            )
 
     def start(self, n: int) -> HeadingState:
         """State of n robots whose heading is not known yet."""

@@ -69,4 +69,4 @@ def height_in_frame(
 
 
 def _unknown_frame(frame: str) -> GaitshiftError:
-    return GaitshiftError(f"unknown frame {frame!r}; known frames: {', '.join(FRAMES)}")
+    return GaitshiftError(f"frame must be {' or '.join(FRAMES)}, got {frame!r}")

@@ -97,7 +97,7 @@ class TouchdownSurprise:
     def __post_init__(self) -> None:
         _ = self._memory
         if not 1.0 <= self.memory <= 1000.0:
-            raise GaitshiftError(f"memory = {self.memory:g}: 1 to 1000 touchdowns would be right")
+            raise GaitshiftError(f"memory must be 1 to 1000 touchdowns, got {self.memory:g}")
 
     @cached_property
     def _memory(self) -> Touches:

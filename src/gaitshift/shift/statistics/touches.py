@@ -39,9 +39,11 @@ class Touches:
 
     def __post_init__(self) -> None:
         if not 1 <= self.kept <= 100:
-            raise GaitshiftError(f"touches = {self.kept}: 1 to 100 a foot would be right")
+            raise GaitshiftError(f"touches must be 1 to 100 for each foot, got {self.kept}")
         if not 0.0 <= self.least_swing < np.inf:
-            raise GaitshiftError(f"least_swing = {self.least_swing:g}: 0 s or more would be right")
+            raise GaitshiftError(
+                f"least_swing must be finite and 0 s or more, got {self.least_swing:g}"
+            )
 
     def start(self, n: int) -> TouchState:
         """State of n robots of which no foot has touched."""

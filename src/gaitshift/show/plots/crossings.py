@@ -36,7 +36,7 @@ def crossings_figure(rows: Sequence[Mapping[str, Any]], path: Path) -> Figure:
     """
     check_target(path)
     if not rows:
-        raise GaitshiftError(f"{path}: there are no crossings to draw")
+        raise GaitshiftError(f"{path}: there must be crossings to draw, got none")
     names = list(dict.fromkeys(row["way"] for row in rows))
     alone = [name.removesuffix(" only") for name in names if name.endswith(" only")]
     colours = {f"{gait} only": colour for gait, colour in gait_colours(alone).items()}

@@ -88,7 +88,7 @@ def _pace(figures: Mapping[str, Any]) -> str:
 def _verdict(verdict: Mapping[str, Any]) -> str:
     score = max(verdict["scores"].values())
     clean = "clean" if verdict["clean"] else f"not clean: {_misses(verdict['misses'])}"
-    return f"named by its contacts: {verdict['gait']} ({score:.2f})   ·   {clean}"
+    return f"gait by contacts: {verdict['gait']} ({score:.2f})   ·   {clean}"
 
 
 def _misses(misses: list[dict[str, Any]]) -> str:

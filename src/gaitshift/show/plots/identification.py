@@ -29,8 +29,8 @@ LATEST = 6.0
 FALSE = "#f3d9c4"
 """Where robots shift that should not."""
 
-NOTICED = "share of the passages to be noticed with a shift"
-OTHERS = "share of other passages with a shift"
+NOTICED = "true positive rate: passages to detect, with a shift"
+OTHERS = "false positive rate: other passages, with a shift"
 """Axes of a ROC curve."""
 
 
@@ -68,8 +68,8 @@ def condition_map(one: Judged, path: Path) -> Figure:
             axis.set_major_formatter(FuncFormatter(_plain))
             axis.set_minor_formatter(NullFormatter())
         regions = (
-            (bool((~quiet).any()), FALSE, "shifts where it should not"),
-            (bool((quiet & ~mostly).any()), PALE, "no shift at all, or most missed"),
+            (bool((~quiet).any()), FALSE, "false shifts"),
+            (bool((quiet & ~mostly).any()), PALE, "most passages missed"),
         )
         axes.legend(
             handles=[Patch(color=colour, label=name) for there, colour, name in regions if there],
@@ -81,9 +81,9 @@ def condition_map(one: Judged, path: Path) -> Figure:
         )
         ends = "max" if (delay > LATEST).any() else "neither"
         bar = cast(Any, figure.colorbar(mesh, ax=axes, pad=0.02, extend=ends))
-        bar.set_label("mean distance until it is noticed [m]")
+        bar.set_label("mean delay [m]")
         bar.outline.set_visible(False)
-        soonest = f"{one.soonest:.2g} s at the soonest" if np.isfinite(one.soonest) else "never"
+        soonest = f"{one.soonest:.2g} s or longer" if np.isfinite(one.soonest) else "never"
         axes.set_title(
             f"{tuned.candidate.name}\nα = {choice.alpha:.3g} {unit}".rstrip()
             + f", β = {choice.beta:g} ({soonest}), leak {choice.leak:g}",

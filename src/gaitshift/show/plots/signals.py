@@ -34,9 +34,9 @@ def check_robot(log: Log, robot: int) -> None:
     """`GaitshiftError` unless the log has a course in time, and this robot."""
     steps, count = log.k.shape
     if steps < 2:
-        raise GaitshiftError(f"a log of {steps} control steps shows nothing; 2 is the least")
+        raise GaitshiftError(f"a log must have 2 control steps or more to draw, got {steps}")
     if not 0 <= robot < count:
-        raise GaitshiftError(f"robot {robot} is not in the log; it holds 0 to {count - 1}")
+        raise GaitshiftError(f"robot must be 0 to {count - 1}, got {robot}")
 
 
 def window(log: Log, t0: float, t1: float) -> Log:
@@ -45,8 +45,7 @@ def window(log: Log, t0: float, t1: float) -> Log:
     end = int(np.searchsorted(log.time, t1, side="right"))
     if end - begin < 2:
         raise GaitshiftError(
-            f"nothing to show from {t0:g} to {t1:g} s: the log goes from {log.time[0]:g} "
-            f"to {log.time[-1]:g} s"
+            f"times must be within {log.time[0]:g} to {log.time[-1]:g} s, got {t0:g} to {t1:g} s"
         )
     return log.part(slice(begin, end))
 

@@ -68,9 +68,9 @@ def house_style() -> Generator[None]:
 def check_target(path: Path) -> None:
     """`GaitshiftError` unless a figure can be written to `path`: asked before the work is done."""
     if path.suffix.lower() not in FORMATS:
-        raise GaitshiftError(f"{path}: the name of a figure ends in {', '.join(FORMATS)}")
+        raise GaitshiftError(f"{path}: the name of a figure must end in {' or '.join(FORMATS)}")
     if not path.parent.is_dir():
-        raise GaitshiftError(f"{path}: there is no folder {path.parent}")
+        raise GaitshiftError(f"{path}: no folder {path.parent}")
 
 
 def save(figure: Figure, path: Path) -> None:

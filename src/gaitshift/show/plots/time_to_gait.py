@@ -35,7 +35,7 @@ def time_to_gait_figure(outcomes: Sequence[Outcome], path: Path) -> Figure:
     """
     check_target(path)
     if not outcomes:
-        raise GaitshiftError(f"{path}: there is no outcome to draw")
+        raise GaitshiftError(f"{path}: there must be outcomes to draw, got none")
     gaits = list(dict.fromkeys(outcome.gait for outcome in outcomes))
     learners = list(dict.fromkeys(outcome.learner for outcome in outcomes))
     height = _LANE * len(gaits) + _MARGINS
@@ -66,7 +66,7 @@ def _draw_scale(axes: Axes, seconds: list[float], lanes: int) -> None:
     ticks = [tick for tick in _TICKS if low < tick < high]
     axes.set_xticks(ticks, [str(tick) for tick in ticks])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel("training time until the gait passes its check [s]")
+    axes.set_xlabel("training time until the gait passes the check [s]")
     axes.grid(visible=True, axis="x")
     axes.grid(visible=False, axis="y")
     axes.set_yticks([])
@@ -118,7 +118,7 @@ def _name_lane(axes: Axes, gait: str, lane: int, medians: list[Outcome]) -> None
     if times is None:
         return
     axes.annotate(
-        f"{ratio_text(times, is_lower_bound=not medians[1].reached)} ×\nsooner",
+        f"{ratio_text(times, is_lower_bound=not medians[1].reached)} ×\nfaster",
         (1.0, lane),
         (12, 0),
         color=INK,

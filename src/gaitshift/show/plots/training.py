@@ -75,10 +75,12 @@ def read_progress(path: Path) -> list[dict[str, str]]:
     """
     table = read(path, may_be_cut=True)
     if len(table) < 2:
-        raise GaitshiftError(f"{path} shows no course: it has {len(table)} iterations, not 2")
+        raise GaitshiftError(f"{path} must have 2 iterations or more to draw, got {len(table)}")
     missing = [column for column in _NEEDED if column not in table[0]]
     if missing:
-        raise GaitshiftError(f"{path} is no progress.csv of a training: it lacks '{missing[0]}'")
+        raise GaitshiftError(
+            f"{path} is not the progress.csv of a training: it lacks '{missing[0]}'"
+        )
     return table
 
 
@@ -87,7 +89,7 @@ def numbers(table: list[dict[str, str]], column: str, path: Path) -> Float[np.nd
     try:
         return np.array([float(row[column]) for row in table])
     except (TypeError, ValueError) as error:
-        raise GaitshiftError(f"{path}: column '{column}' holds more than numbers") from error
+        raise GaitshiftError(f"{path}: column '{column}' must hold numbers") from error
 
 
 def _draw_course(

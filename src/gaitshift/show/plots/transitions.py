@@ -31,7 +31,9 @@ def transition_map(rows: Sequence[Mapping[str, Any]], path: Path) -> Figure:
     check_target(path)
     grounds = {row["ground"] for row in rows}
     if len(grounds) != 1:
-        raise GaitshiftError(f"{path}: a map is of the shifts on one ground, not {len(grounds)}")
+        raise GaitshiftError(
+            f"{path}: a map must show the shifts on one terrain, got {len(grounds)}"
+        )
     gaits = list(dict.fromkeys(name for row in rows for name in (row["old"], row["new"])))
     at = {name: index for index, name in enumerate(gaits)}
     share = np.full((len(gaits), len(gaits)), np.nan)

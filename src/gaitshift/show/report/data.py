@@ -91,13 +91,13 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
         feet = zip(LEGS, heights, LEG_COLOURS, strict=True)
         rows += [
             lines(
-                "height of each foot's last touch [m]",
+                "height of the last touch of each foot [m]",
                 [series(leg, height, colour) for leg, height, colour in feet],
                 unit="m",
                 digits=3,
             ),
             lines(
-                "counter k and what it is held against, β [counts]",
+                "counter k and threshold β [counts]",
                 [
                     series("k", log.k[:, robot], "ink"),
                     series("β", log.threshold[:, robot], "#d55e00"),
@@ -108,13 +108,13 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
         ]
     speeds = [
         series("speed", forward_speed(log, robot), "ink"),
-        series("asked for", log.command[:, robot, 0], "#0072b2"),
+        series("command", log.command[:, robot, 0], "#0072b2"),
     ]
     base, below = log.qpos[:, robot, 2], ground_below(log, robot)
     levels = [series("ground", below, GROUND, fill=True), series("base", base, "ink")]
     rows += [
-        lines("speed along the robot's axis [m/s]", speeds, unit="m/s", digits=2),
-        lines("height of the base and of the ground below it [m]", levels, unit="m", digits=2),
+        lines("forward speed [m/s]", speeds, unit="m/s", digits=2),
+        lines("height of the base and of the ground below [m]", levels, unit="m", digits=2),
     ]
     return rows
 

@@ -56,9 +56,9 @@ def write_report(
         walks=[("", run_data(log, robot))],
         sections=[
             ("Gaits", table(STRETCH_HEAD, stretches(log, robot))),
-            ("Shifts", table(_SHIFT_HEAD, _shifts(log, robot)) or "<p>It kept its gait.</p>"),
+            ("Shifts", table(_SHIFT_HEAD, _shifts(log, robot)) or "<p>No shift.</p>"),
             ("Film", _video(video)),
-            ("What made it", facts_table(known, facts)),
+            ("Settings", facts_table(known, facts)),
         ],
     )
 
@@ -66,10 +66,12 @@ def write_report(
 def check_kind(log: Log) -> None:
     """Raises `GaitshiftError` where the robot of a log is of an unknown kind."""
     if log.robot not in ROBOTS:
-        raise GaitshiftError(f"the log is of '{log.robot}'; known: {', '.join(ROBOTS)}")
+        raise GaitshiftError(
+            f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
+        )
 
 
-STRETCH_HEAD = ("gait", "from", "to", "named by its contacts", "speed", "pattern", "misses")
+STRETCH_HEAD = ("gait", "from", "to", "gait by contacts", "speed", "pattern", "misses")
 _SHIFT_HEAD = ("at", "where", "from", "to", "k")
 
 
@@ -79,7 +81,7 @@ def _summary(log: Log, robot: int) -> str:
     way = float(log.qpos[np.searchsorted(log.time, seconds) - 1, robot, 0] - log.qpos[0, robot, 0])
     count = len(shift_times(log, robot))
     shifts = "no shift of gait" if count == 0 else f"{count} shift{'s' * (count > 1)} of gait"
-    end = "on its feet to the end" if fell is None else f"fallen after {fell:.1f} s"
+    end = "no fall" if fell is None else f"fall after {fell:.1f} s"
     return f"{way:.1f} m in {seconds:.1f} s, {way / seconds:.2f} m/s, {shifts}, {end}"
 
 

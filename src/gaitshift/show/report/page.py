@@ -40,7 +40,7 @@ def write_page(
     if walks:
         data += "".join(_json(f"run{i}", walk, " data-walk") for i, (_, walk) in enumerate(walks))
     if course is not None:
-        told = "<p>Dotted lines are ends of stages; the wheel zooms, a double click shows all.</p>"
+        told = "<p>Dotted lines: ends of stages. Wheel: zoom. Double click: reset.</p>"
         body = f"<h2>Course of the training</h2><div id='course'></div>{told}{body}"
         data += _json("progress", course)
     parts = {

@@ -19,7 +19,7 @@ from gaitshift.table import Row, markdown, write
 README = "README.md"
 
 _ALT = {
-    figures.REWARDS: "Reward over the iterations, by gait, beside the paper's landmarks",
+    figures.REWARDS: "Reward over the iterations, by gait, with the values of the paper",
     figures.COMPARISONS: "Forward speed over the iterations, by setting",
 }
 
@@ -41,7 +41,7 @@ def write_report(
         report: called with the policies judged and those in all.
     """
     if not results.seeds:
-        raise GaitshiftError(f"{runs} holds no run that is over, so there is nothing to tell")
+        raise GaitshiftError(f"{runs} must hold at least one finished run, got none")
     out.mkdir(parents=True, exist_ok=True)
     judged = judge(results, runs, told or Told(), report)
     found = findings(results)
@@ -73,9 +73,9 @@ def _readme(
     ablations: list[Row],
     written: list[str],
 ) -> str:
-    parts = ["# The paper's recipe, run again", _introduction(results)]
+    parts = ["# Reproduction of the paper", _introduction(results)]
     if found:
-        parts += ["## What holds", _verdicts(found)]
+        parts += ["## Verdicts", _verdicts(found)]
         parts += [
             f"**{f.name[0].upper()}{f.name[1:]}.** *The paper:* {f.paper} *Measured:* {f.measured} "
             f"**It {f.verdict}.**"
@@ -89,7 +89,7 @@ def _readme(
         if name.endswith(".png") and name != figures.COMPARISONS
     ]
     if len(ablations) > 1:
-        parts += ["## One thing changed at a time", _ablation_table(ablations)]
+        parts += ["## Ablations", _ablation_table(ablations)]
     if figures.COMPARISONS in written:
         parts.append(f"![{_ALT[figures.COMPARISONS]}]({figures.COMPARISONS})")
     return "\n\n".join(parts) + "\n"
@@ -101,21 +101,21 @@ def _introduction(results: Results) -> str:
     runs = sum(map(len, results.seeds.values()))
     return "\n".join(
         (
-            f"Written by `gaitshift reproduce` from {runs} of {len(plan.jobs)} runs; every number "
-            "below, and every verdict, is computed from them.",
-            f"{recipe.robots} robots × {recipe.steps} steps × {recipe.iterations} iterations on "
-            "flat ground, Table I and b = 200 alone, the paper's network and PPO numbers, 100 Hz; "
-            f"{plan.seeds} seeds a gait.",
-            "Two choices are ours: gains of 80/2, because Kp = 3 cannot hold this robot up "
-            f"(it is compared below), and a lock-out of {LOCKOUT} steps between two changes of the "
-            "machine's state, because the published plateau asks for it. The bonus is added.",
-            f"Each ablation changes one thing, for trot, over {plan.ablation_seeds} seeds and "
-            f"{plan.ablation_iterations} iterations, and is held against as much of the same.",
-            f"A run *walks* from the first iteration from which its mean speed stays above "
-            f"{WALKING_SPEED:g} m/s and its machine changes state more than {WALKING_CHANGES:g} "
-            f"times a second, {HELD_FOR} iterations running; *at the end* is the last tenth. "
-            "Figures of a training are those of robots that explore. Courses dip every "
-            f"{recipe.checkpoint_every} iterations: at a checkpoint all robots start anew.",
+            f"Written by `gaitshift reproduce` from {runs} of {len(plan.jobs)} runs. All numbers "
+            "and verdicts are computed from them.",
+            f"Each run has {recipe.robots} robots × {recipe.steps} steps × {recipe.iterations} "
+            "iterations on flat ground at 100 Hz, with the rewards of Table I, b = 200, and the "
+            f"network and PPO settings of the paper; there are {plan.seeds} seeds for each gait.",
+            "Three choices are ours: gains of 80/2, because Kp = 3 cannot hold this robot up (see "
+            f"the ablation); a lock-out of {LOCKOUT} steps between two changes of the machine's "
+            "state, as the published plateau implies; and a bonus that is added to the reward.",
+            f"Each ablation changes one setting of trot, over {plan.ablation_seeds} seeds and "
+            f"{plan.ablation_iterations} iterations, against the same of the reference.",
+            f"A run *walks* from the first of {HELD_FOR} successive iterations with a mean speed "
+            f"above {WALKING_SPEED:g} m/s and more than {WALKING_CHANGES:g} changes of the "
+            "machine's state per second. *At the end* is the last tenth of the iterations. "
+            "Training figures include exploration noise. Curves dip every "
+            f"{recipe.checkpoint_every} iterations, as all robots start again at a checkpoint.",
         )
     )
 
@@ -133,7 +133,7 @@ def _gait_table(judged: list[Judged]) -> str:
         "speed [m/s]",
         "pattern fraction",
         "cycles [1/s]",
-        "touchdowns a cycle",
+        "touchdowns per cycle",
         "cost of transport",
     )
     return markdown(
@@ -160,7 +160,7 @@ def _ablation_table(rows: list[Row]) -> str:
         "late_speed": "speed at the end [m/s]",
         "late_survival": "survival",
         "late_changes_per_s": "changes of state [1/s]",
-        "late_stance_fraction": "share of steps in the stance of the state",
+        "late_stance_fraction": "share of steps with the stance of the state",
     }
     shown = [{**row, "walking": f"{row['walking']} of {row['seeds']}"} for row in rows]
     return markdown(

@@ -26,13 +26,13 @@ from gaitshift.show.report.page import facts_table, figure, table, write_page
 from gaitshift.table import Row
 
 _NOTICED = {
-    "rough": "rough ground against all others",
-    "flat": "level ground against those of rough ground",
+    "rough": "rough ground against others",
+    "flat": "level ground against rough ground",
 }
 """What ROC curves are about, by what is to be noticed."""
 
-_FALSE = Kind(name="shifts where it should not", colour=FALSE)
-_MISSED = Kind(name="no shift at all, or most missed", colour="pale")
+_FALSE = Kind(name="false shifts", colour=FALSE)
+_MISSED = Kind(name="most passages missed", colour="pale")
 
 
 def write_identification_page(
@@ -49,7 +49,7 @@ def write_identification_page(
     """
     figures: dict[str, Mapping[str, Any]] = {}
     summary = [condition_cells(row) for row in condition_rows(judged)]
-    sections = [("Side by side", table(CONDITIONS_HEAD, [(cells, None) for cells in summary]))]
+    sections = [("All conditions", table(CONDITIONS_HEAD, [(cells, None) for cells in summary]))]
     met = hardest_first(judged)
     for index, course in enumerate(met):
         figures[f"roc{index}"] = _roc(judged, course)
@@ -67,8 +67,8 @@ def write_identification_page(
             _folded(_titled(summary[index]), inner + table(COURSES_HEAD, rows), index == 0)
         )
     sections += [
-        ("Condition by condition", "".join(folded)),
-        ("What made it", facts_table({"command": command})),
+        ("Each condition", "".join(folded)),
+        ("Settings", facts_table({"command": command})),
     ]
     write_page(path, title=title, summary=words, sections=sections, figures=figures)
 
@@ -91,12 +91,12 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
         cells = [(row_cells(row), None) for row in of]
         content = said + figure(f"ground{index}") + table(HEAD, cells)
         sections.append((f"On {ground}", content))
-    sections.append(("What made it", facts_table({"command": command})))
+    sections.append(("Settings", facts_table({"command": command})))
     write_page(
         path,
-        title="Shifts in an instant",
-        summary="Policy and machine are swapped at an instant of the old gait's stride. A shift "
-        "succeeds when the robot does not fall within 5 s and comes to show the new gait.",
+        title="Gait shifts at a random phase",
+        summary="Policy and reward machine are swapped at a random phase of the old gait's stride. "
+        "A shift succeeds if the robot does not fall within 5 s and shows the new gait.",
         sections=sections,
         figures=figures,
     )
@@ -105,7 +105,7 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
 def _titled(cells: tuple[str, ...]) -> str:
     name, alpha, beta, seconds, metres, leak, noticed, delay, false, *_ = cells
     numbers = f"α {alpha}, β {beta} ({seconds or '–'} s, {metres or '–'} m), leak {leak}"
-    return f"{name}: {numbers}: noticed {noticed}, after {delay or '–'} m; {false} false"
+    return f"{name}: {numbers}: detected {noticed}, delay {delay or '–'} m; {false} false"
 
 
 def _folded(title: str, inner: str, opened: bool) -> str:
@@ -118,11 +118,11 @@ def _condition_map(one: Judged) -> dict[str, Any]:
     grid, tally, choice, unit = tuned.grid, tuned.tally, tuned.choice, tuned.candidate.unit
     kind = np.where(tally.fired > 0, 1, np.where(tally.missed < 0.5, 0, 2))
     return heat_map(
-        title=f"How soon {tuned.candidate.name} notices, over α and β",
+        title=f"Mean delay of {tuned.candidate.name} over α and β",
         x=Axis.of_numbers("β [counts]", "β", grid.betas),
         y=Axis.of_numbers(f"α [{unit}]" if unit else "α", "α", grid.alphas, unit),
         shade=tally.delay_m,
-        scale=f"mean distance until it is noticed, 0 to {LATEST:g} m",
+        scale=f"mean delay, 0 to {LATEST:g} m",
         span=(0.0, LATEST),
         stops=("#0b3c5d", "#4f97c4", "#dcebf5"),
         kind=kind,
@@ -183,7 +183,7 @@ def _transition_map(rows: Sequence[Row]) -> dict[str, Any]:
         x=Axis.of_names("to", dict(titles)),
         y=Axis.of_names("from", dict(reversed(titles.items()))),
         shade=np.sqrt(failed),
-        scale="failed, 0 to 100 % (by its square root)",
+        scale="failed, 0 to 100 % (square-root scale)",
         span=(0.0, 1.0),
         stops=("#f7e3d6", "#d55e00", "#7a2f00"),
         kind=kind,

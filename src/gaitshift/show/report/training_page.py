@@ -38,9 +38,9 @@ def write_training_report(
         walks=[(name, run_data(log, 0)) for name, log in walks],
         course=_course(folder / "progress.csv"),
         sections=[
-            ("These walks", table(("policy", *STRETCH_HEAD), _walks(walks))),
-            ("Verdicts on the way, on flat ground", _verdicts(folder / "verdicts.csv")),
-            ("What made it", facts_table(_facts(folder / "config.json"))),
+            ("Walks at checkpoints", table(("policy", *STRETCH_HEAD), _walks(walks))),
+            ("Verdicts at checkpoints, on flat ground", _verdicts(folder / "verdicts.csv")),
+            ("Settings", facts_table(_facts(folder / "config.json"))),
         ],
     )
 
@@ -88,8 +88,8 @@ def _facts(path: Path) -> dict[str, str]:
             "command": config["command"],
             "seed": str(config["seed"]),
             "iterations": ", ".join(stages),
-            "robots × steps an iteration": f"{recipe['robots']} × {recipe['steps']}",
-            **{f"{name} then": str(one) for name, one in config["versions"].items()},
+            "robots × steps per iteration": f"{recipe['robots']} × {recipe['steps']}",
+            **{f"{name} version": str(one) for name, one in config["versions"].items()},
         }
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise GaitshiftError(f"{path} cannot be read: {error}") from error

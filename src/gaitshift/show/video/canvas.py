@@ -69,7 +69,7 @@ class Canvas:
             if self._gl is not None:
                 self._gl.free()
             raise VideoUnavailable(
-                f"no OpenGL to draw videos with ({_first_line(error)}); "
+                f"videos need OpenGL ({_first_line(error)}); "
                 "on Debian or Ubuntu: apt-get install libegl1 libgl1"
             ) from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)

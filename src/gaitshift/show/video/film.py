@@ -41,7 +41,7 @@ class FilmWriter:
             self._frames.send(None)
         except RuntimeError as error:
             raise VideoUnavailable(
-                f"no ffmpeg to write videos with ({error}); pip install imageio[ffmpeg]"
+                f"videos need ffmpeg ({error}); install imageio[ffmpeg]"
             ) from error
 
     def add(self, picture: UInt8[np.ndarray, "height width 3"]) -> None:
@@ -66,7 +66,7 @@ class FilmWriter:
 def read_film(path: Path) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
     """The pictures of a video, one after the other; `GaitshiftError` where it cannot be read."""
     if not path.is_file():
-        raise GaitshiftError(f"no video {path}")
+        raise GaitshiftError(f"no video file {path}")
     ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(path)]
     command = [*ffmpeg, "-f", "image2pipe", "-c:v", "ppm", "-"]
     # imageio's own reader leaves its pipes open.
@@ -80,4 +80,4 @@ def read_film(path: Path) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
             yield np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)
             empty = False
     if empty:
-        raise GaitshiftError(f"{path} is no video that ffmpeg can read")
+        raise GaitshiftError(f"{path} must be a video that ffmpeg can read")

@@ -69,24 +69,27 @@ def render(
 
 def _check_target(path: Path, width: int, height: int, fps: int) -> None:
     if path.suffix.lower() != ".mp4":
-        raise GaitshiftError(f"{path}: the name of a video ends in .mp4")
+        raise GaitshiftError(f"{path}: the name of a video must end in .mp4")
     if not path.parent.is_dir():
-        raise GaitshiftError(f"{path}: there is no folder {path.parent}")
+        raise GaitshiftError(f"{path}: no folder {path.parent}")
     if min(width, height) < _SMALLEST or width % 2 or height % 2:
         raise GaitshiftError(
-            f"a video of {width} × {height} pixels: even numbers from {_SMALLEST} up would be right"
+            f"width and height must be even and {_SMALLEST} or more, got {width} × {height}"
         )
     if not 1 <= fps <= 120:
-        raise GaitshiftError(f"{fps} pictures a second: 1 to 120 would be right")
+        raise GaitshiftError(f"fps must be 1 to 120, got {fps}")
 
 
 def _check_log(log: Log, robot: int) -> None:
     check_robot(log, robot)
     if log.robot not in ROBOTS:
-        raise GaitshiftError(f"the log is of a '{log.robot}'; known robots: {', '.join(ROBOTS)}")
+        raise GaitshiftError(
+            f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
+        )
     if not walks_on_kept_ground(log, robot):
         raise GaitshiftError(
-            f"robot {robot} walked on a ground of its own, and the log keeps the first robot's only"
+            f"robot must be 0 where robots have different terrains, as the log keeps only that of "
+            f"robot 0, got {robot}"
         )
 
 

@@ -24,7 +24,7 @@ def contact_sheet(
         GaitshiftError: no such video, no pictures in it, or `count` less than 1.
     """
     if count < 1:
-        raise GaitshiftError(f"{count} pictures on a sheet: at least 1 would be right")
+        raise GaitshiftError(f"count must be 1 or more, got {count}")
     chosen = _chosen(frames, count)
     width, height = chosen[0].width + _GAP, chosen[0].height + _GAP
     columns = min(_COLUMNS, count)
@@ -41,7 +41,7 @@ def _chosen(
     """So many pictures, small. A file is read twice: its pictures do not fit into memory."""
     total = sum(1 for _ in read_film(frames)) if isinstance(frames, Path) else len(frames)
     if total == 0:
-        raise GaitshiftError("no pictures to put on a sheet")
+        raise GaitshiftError("frames must have at least one picture, got none")
     places = [round(i * (total - 1) / max(count - 1, 1)) for i in range(count)]
     pictures = read_film(frames) if isinstance(frames, Path) else frames
     small = {n: _shrunk(frame) for n, frame in enumerate(pictures) if n in places}

@@ -152,6 +152,6 @@ def machine_svg(machine: RewardMachine, state: int, colour: str) -> str:
     )
     return (
         f'<div style="padding:0 1em"><div style="font-size:12px">machine of <b>{machine.name}</b>, '
-        f'the feet that ought to be down</div><svg viewBox="0 0 {wide} {high}" width="100%" '
+        f'feet that should be down</div><svg viewBox="0 0 {wide} {high}" width="100%" '
         f'role="img" aria-label="machine">{arrows}{nodes}</svg></div>'
     )

@@ -53,9 +53,9 @@ class LiveConfig:
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
-            raise GaitshiftError(f"{self.robots} robots: 1 to {MOST_ROBOTS} would be right")
+            raise GaitshiftError(f"robots must be 1 to {MOST_ROBOTS}, got {self.robots}")
         if self.seed < 0:
-            raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
+            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
 
     @property
     def graph(self) -> GaitGraph:
@@ -207,7 +207,7 @@ class LiveRun:
     def _switcher(self, config: LiveConfig) -> Autonomous | None:
         missing = {*config.graph.gaits} - {*self._policies}
         if missing:
-            raise GaitshiftError(f"no policy for the gait '{min(missing)}'")
+            raise GaitshiftError(f"gait must be one with a policy, got '{min(missing)}'")
         return Autonomous(config.graph, config.robots) if config.is_autonomous else None
 
     @staticmethod

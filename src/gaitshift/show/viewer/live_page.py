@@ -157,7 +157,7 @@ class LivePage:
         self._notify("recorded", self._save(log), "green")
 
     def _refuse(self, error: GaitshiftError) -> None:
-        self._notify("that cannot be done", str(error), "red")
+        self._notify("error", str(error), "red")
 
     def _notify(self, title: str, body: str, colour: str) -> None:
         for client in self._server.get_clients().values():

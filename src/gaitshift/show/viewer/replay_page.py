@@ -28,7 +28,9 @@ class ReplayPage:
 
     def __init__(self, server: viser.ViserServer, log: Log) -> None:
         if log.robot not in ROBOTS:
-            raise GaitshiftError(f"the log is of '{log.robot}'; known: {', '.join(ROBOTS)}")
+            raise GaitshiftError(
+                f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
+            )
         check_robot(log, 0)
         self._frames = frames_of(_few(log), _EVERY)
         self._scene = Scene(server, ROBOTS[log.robot], log.gaits)

@@ -27,14 +27,14 @@ def serve(host: str, port: int) -> viser.ViserServer:
         GaitshiftError: the address or port cannot be had.
     """
     if not 1 <= port <= 65535:
-        raise GaitshiftError(f"port {port}: 1 to 65535 would be right")
+        raise GaitshiftError(f"port must be 1 to 65535, got {port}")
     with socket.socket() as trial:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             trial.bind((host, port))
         except OSError as error:
             raise GaitshiftError(
-                f"{host}:{port} cannot be had ({error.strerror}); another --port would be right"
+                f"cannot listen on {host}:{port} ({error.strerror}); give another --port"
             ) from error
     with redirect_stdout(io.StringIO()):  # it prints a box of its own
         server = viser.ViserServer(host=host, port=port, label="gaitshift", verbose=False)

@@ -44,7 +44,7 @@ def page_speed(robots: int, seconds: float, policies: Mapping[str, Policy]) -> d
         `sent_mb_per_s`: what the client took in, in a second.
     """
     if not 1.0 <= seconds <= 3600.0:
-        raise GaitshiftError(f"a page for {seconds:g} s: 1 to 3600 would be right")
+        raise GaitshiftError(f"page_seconds must be 1 to 3600 s, got {seconds:g}")
     port = _free_port()
     with _on_one_core(), _served(port) as server:
         page = LivePage(server, LiveRun(LiveConfig(robots=robots), policies), lambda log: "")
@@ -95,7 +95,7 @@ def _watched(address: str) -> Generator[Any]:
         deadline = time.perf_counter() + _PATIENCE
         while taken_in.value == 0:
             if not client.is_alive() or time.perf_counter() > deadline:
-                raise GaitshiftError(f"no client could connect to the page at {address}")
+                raise GaitshiftError(f"a client could not connect to the page at {address}")
             time.sleep(0.05)
         yield taken_in
     finally:

@@ -44,15 +44,15 @@ class EnvConfig:
 
     def __post_init__(self) -> None:
         if self.episode_steps < 1:
-            raise GaitshiftError(f"episode of {self.episode_steps} steps: at least 1 is needed")
+            raise GaitshiftError(f"episode_steps must be 1 or more, got {self.episode_steps}")
         if self.forward_speed is not None and not 0 <= self.forward_speed <= MOST_SPEED:
             raise GaitshiftError(
-                f"commanded speed {self.forward_speed} m/s: 0 to {MOST_SPEED:g} m/s would be right"
+                f"forward_speed must be 0 to {MOST_SPEED:g} m/s, got {self.forward_speed}"
             )
         if not 0 <= self.command_share <= 1:
-            raise GaitshiftError(f"command_share {self.command_share}: 0 to 1 would be right")
+            raise GaitshiftError(f"command_share must be 0 to 1, got {self.command_share}")
         if self.command_interval < 1:
-            raise GaitshiftError(f"command_interval {self.command_interval}: at least 1, please")
+            raise GaitshiftError(f"command_interval must be 1 or more, got {self.command_interval}")
 
     @classmethod
     def paper(cls) -> "EnvConfig":

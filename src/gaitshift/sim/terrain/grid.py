@@ -54,8 +54,9 @@ class Grid:
         rows, cols = self.shape
         if rows * cols > MAX_SAMPLES:
             raise GaitshiftError(
-                f"{self.length:g} × {self.width:g} m with a cell of {self.cell:g} m are "
-                f"{rows * cols} samples, at most {MAX_SAMPLES} fit: take a larger cell"
+                f"a terrain must have at most {MAX_SAMPLES} samples, got {rows * cols} for "
+                f"{self.length:g} × {self.width:g} m with a cell of {self.cell:g} m; give a larger "
+                "cell"
             )
 
     @property

@@ -45,12 +45,16 @@ class Terrain:
     def __post_init__(self) -> None:
         if self.height.ndim != 2 or min(self.height.shape) < 2:
             shape = self.height.shape
-            raise GaitshiftError(f"terrain '{self.name}': needs 2 × 2 samples or more, got {shape}")
+            raise GaitshiftError(
+                f"terrain '{self.name}': samples must be 2 × 2 or more, got {shape}"
+            )
         if not np.isfinite(self.height).all():
-            raise GaitshiftError(f"terrain '{self.name}': every height must be a finite number")
+            raise GaitshiftError(
+                f"terrain '{self.name}': heights must be finite, got NaN or infinity"
+            )
         if not (np.isfinite([*self.size, *self.origin]).all() and min(self.size) > 0.0):
             raise GaitshiftError(
-                f"terrain '{self.name}': size must be positive and origin finite [m], "
+                f"terrain '{self.name}': size must be above 0 and origin finite [m], "
                 f"got size {self.size}, origin {self.origin}"
             )
         height = np.array(self.height, dtype=np.float64, order="C")

@@ -95,7 +95,7 @@ def stairs(
     room = length / 2 - 1.5 * landing
     if room < 0.0:
         raise GaitshiftError(
-            f"stairs with landings of {landing:g} m need a length of {3 * landing:g} m or more, "
+            f"length must be {3 * landing:g} m or more for stairs with landings of {landing:g} m, "
             f"got {length:g}"
         )
     if cell > run / 2:

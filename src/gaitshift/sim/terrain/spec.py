@@ -149,10 +149,10 @@ def from_spec(
     The same spec, seed and sizes give the same bits. In a track each piece draws from its own
     stream of the seed, so that changing one piece leaves the noise of the others.
 
-    `GaitshiftError`, one line that names the faulty piece and what would be right.
+    `GaitshiftError`, one line that names the faulty piece and what is allowed.
     """
     if seed < 0:
-        raise GaitshiftError(f"terrain {spec!r}: the seed must be 0 or more, got {seed}")
+        raise GaitshiftError(f"terrain {spec!r}: seed must be 0 or larger, got {seed}")
     pieces = [_read(text.strip()) for text in spec.split(",")]
     if cell is None:
         cell = min(piece.kind.cell for piece in pieces)
@@ -184,15 +184,15 @@ def _read(text: str) -> _Piece:
     """One piece read; `GaitshiftError` where it is not written as pieces are."""
     form = _FORM.fullmatch(text)
     if form is None:
-        raise _faulty(text, "a piece is NAME, NAME:NUMBER or NAME:NUMBER@METRES")
+        raise _faulty(text, "a piece must be NAME, NAME:NUMBER or NAME:NUMBER@METRES")
     kind = next((kind for kind in KINDS if kind.name == form["name"].strip()), None)
     if kind is None:
-        raise _faulty(text, f"there is no ground called {form['name']!r}")
+        raise _faulty(text, f"unknown terrain {form['name']!r}")
     written, length = form["number"], form["length"]
     if kind.number is None and written is not None:
-        raise _faulty(text, f"{kind.name} takes no number")
+        raise _faulty(text, f"{kind.name} must have no number, got {written}")
     if kind.number is not None and written is None:
-        raise _faulty(text, f"the {kind.number.name} is missing, {kind.number.range}")
+        raise _faulty(text, f"{kind.number.name} is missing, must be {kind.number.range}")
     return _Piece(
         text=text,
         kind=kind,
@@ -206,7 +206,7 @@ def _number(text: str, written: str, quantity: Quantity) -> float:
     try:
         return quantity.check(float(written))
     except ValueError:
-        problem = f"{quantity.name} must be a number, {quantity.range}, got {written!r}"
+        problem = f"{quantity.name} must be {quantity.range}, got {written!r}"
         raise _faulty(text, problem) from None
     except GaitshiftError as error:
         raise _faulty(text, str(error)) from None
@@ -215,11 +215,11 @@ def _number(text: str, written: str, quantity: Quantity) -> float:
 def _whole_cells(piece: _Piece, cell: float) -> float:
     """Length of a track's piece, rounded to whole cells [m]."""
     if piece.length is None:
-        raise _faulty(piece.text, f"in a track every piece needs its length, as in {_TRACK}")
+        raise _faulty(piece.text, f"every piece of a track must have a length, as in {_TRACK}")
     return max(1, round(piece.length / cell)) * cell
 
 
 def _faulty(text: str, problem: str) -> GaitshiftError:
     """Error about one piece, in one line."""
     usages = ", ".join(kind.usage for kind in KINDS)
-    return GaitshiftError(f"terrain {text!r}: {problem}; pieces are {usages}")
+    return GaitshiftError(f"terrain {text!r}: {problem}; known pieces: {usages}")

@@ -67,7 +67,9 @@ def sections_of(name: str, x0: float, length: float) -> tuple[Section, ...]:
         try:
             end = x0 + (float(metres) if metres else length)
         except ValueError:
-            raise GaitshiftError(f"ground '{text}': '{metres}' is no length in metres") from None
+            raise GaitshiftError(
+                f"terrain '{text}': length must be a number of metres, got '{metres}'"
+            ) from None
         sections.append(Section(name=piece, x0=x0, x1=end))
         x0 = end
     return tuple(sections)
@@ -76,15 +78,15 @@ def sections_of(name: str, x0: float, length: float) -> tuple[Section, ...]:
 def _check_alike(pieces: Sequence[Terrain]) -> None:
     """`GaitshiftError` unless there are pieces and all have the first one's width and cell."""
     if not pieces:
-        raise GaitshiftError("a track needs one piece or more")
+        raise GaitshiftError("a track must have at least one piece, got none")
     first = pieces[0]
     for piece in pieces:
         same_rows = piece.height.shape[0] == first.height.shape[0]
         if not (same_rows and np.allclose(piece.cell, first.cell, rtol=1e-6, atol=0.0)):
             raise GaitshiftError(
-                f"the pieces of a track must have the same width and cell: "
-                f"'{piece.name}' is {piece.size[1]:g} m wide with a cell of {piece.cell}, "
-                f"'{first.name}' is {first.size[1]:g} m wide with a cell of {first.cell}"
+                f"the pieces of a track must have the same width and cell, got "
+                f"'{piece.name}' {piece.size[1]:g} m wide with a cell of {piece.cell} and "
+                f"'{first.name}' {first.size[1]:g} m wide with a cell of {first.cell}"
             )
 
 

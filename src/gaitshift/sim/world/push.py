@@ -23,9 +23,12 @@ class PushConfig:
 
     def __post_init__(self) -> None:
         if not 0 <= self.force <= 1000:
-            raise GaitshiftError(f"push of {self.force} N: a force from 0 to 1000 N would be right")
+            raise GaitshiftError(f"push must be 0 to 1000 N, got {self.force}")
         if not 0 < self.duration < self.interval:
-            raise GaitshiftError("a push must be shorter than the interval between pushes")
+            raise GaitshiftError(
+                f"duration of a push must be 1 step or more and below the interval, "
+                f"{self.interval} steps, got {self.duration}"
+            )
 
 
 class Pusher:

@@ -52,7 +52,7 @@ class World:
             threads: physics threads, 0 for all cores.
         """
         if n < 1:
-            raise GaitshiftError(f"{n} robots: at least 1 would be right")
+            raise GaitshiftError(f"robots must be 1 or more, got {n}")
         self.robot = robot
         self.n = n
         self._gains = robot.gains_of(gains)
@@ -65,7 +65,7 @@ class World:
         """Exchanges the ground; robots go on as they moved, set down on it where they stood."""
         terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
         if not terrains:
-            raise GaitshiftError("no terrain to stand on; give one or more")
+            raise GaitshiftError("there must be at least one terrain, got none")
         kept = self._kept_state(terrains) if hasattr(self, "_batch") else None
         self.terrains = terrains[: self.n]
         models = [build_model(self.robot, self._gains, ground) for ground in self.terrains]
@@ -142,7 +142,7 @@ class World:
             bad = int(np.flatnonzero(~np.isfinite(target).all(axis=1))[0])
             joint = self.robot.joint_names[int(np.flatnonzero(~np.isfinite(target[bad]))[0])]
             raise GaitshiftError(
-                f"joint target of robot {bad}, {joint}, is not a number; nothing was moved"
+                f"joint targets must be numbers, got NaN or infinity for {joint} of robot {bad}"
             )
         self._ctrl[:] = target
         self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))

@@ -1,0 +1,62 @@
+"""Shapes and types that gaitshift annotates, checked in a sample of calls while tests run.
+
+To check a call costs more than most of the calls themselves. A function's first calls show what its
+callers hand it; the sample of later ones shows what comes up in a long run.
+"""
+
+import functools
+import inspect
+from dataclasses import is_dataclass
+
+import jaxtyping
+from beartype import BeartypeConf, beartype
+from jaxtyping import install_import_hook
+
+check_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
+"""beartype that takes an int for a float, as type checkers do (PEP 484)."""
+
+FIRST, EVERY = 50, 20
+"""ours: of each function's calls in a test, the first 50 are checked and then one in 20."""
+
+_calls = {}
+
+
+def install():
+    """Before anything of gaitshift is imported: its annotations then hold whenever a test runs."""
+    whole = jaxtyping.jaxtyped
+
+    def jaxtyped(*, typechecker):
+        check = whole(typechecker=typechecker)
+
+        def decorated(thing):
+            if inspect.isfunction(thing):
+                return _sampled(thing, check)
+            if is_dataclass(thing) and not hasattr(thing.__init__, "__wrapped__"):
+                thing.__init__ = _sampled(thing.__init__, check)
+            return thing
+
+        return decorated
+
+    jaxtyping.jaxtyped = jaxtyped
+    install_import_hook("gaitshift", "checking.check_types")
+
+
+def begin_test():
+    """Counts calls anew."""
+    _calls.clear()
+
+
+def _sampled(plain, check):
+    key = id(plain.__code__)  # the same for all that a nested `def` makes
+    checked = None
+
+    @functools.wraps(plain)
+    def call(*args, **kwargs):
+        nonlocal checked
+        count = _calls[key] = _calls.get(key, 0) + 1
+        if count > FIRST and count % EVERY:
+            return plain(*args, **kwargs)
+        checked = checked or check(plain)
+        return checked(*args, **kwargs)
+
+    return call
