@@ -4,14 +4,13 @@ from gaitshift.lab.identification.choice import Choice as Choice
 from gaitshift.lab.identification.choice import choose as choose
 from gaitshift.lab.identification.firings import Detections as Detections
 from gaitshift.lab.identification.firings import FalseShifts as FalseShifts
-from gaitshift.lab.identification.firings import Grid as Grid
+from gaitshift.lab.identification.firings import ParameterGrid as ParameterGrid
 from gaitshift.lab.identification.firings import Tally as Tally
 from gaitshift.lab.identification.firings import counters as counters
 from gaitshift.lab.identification.firings import counts_at as counts_at
 from gaitshift.lab.identification.firings import detections as detections
 from gaitshift.lab.identification.firings import false_shifts as false_shifts
 from gaitshift.lab.identification.firings import first_firings as first_firings
-from gaitshift.lab.identification.firings import replay as replay
 from gaitshift.lab.identification.ground import is_rough as is_rough
 from gaitshift.lab.identification.ground import rough_ground as rough_ground
 from gaitshift.lab.identification.log_files import passages as passages

@@ -14,7 +14,7 @@ SHIPPED = "touchdown_surprise"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Said:
+class RecordedValues:
     """A statistic whose numbers were known before, step by step: what it says forgets nothing."""
 
     values: Float[np.ndarray, "T N M"]

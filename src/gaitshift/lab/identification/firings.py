@@ -1,6 +1,6 @@
 """First firings of a rule over a whole grid of α and β: detections, delays and false shifts."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.recording import Recording
-from gaitshift.shift import AnyStatistic, Rule
+from gaitshift.shift import Rule
 
 _TOGETHER = 16
 """Robots that a leaking counter is run for at once: some more take memory, fewer take time."""
@@ -155,7 +155,7 @@ def _stretch(recording: Recording) -> tuple[Int[np.ndarray, " N"], Int[np.ndarra
 
 
 @dataclass(frozen=True, kw_only=True)
-class Grid:
+class ParameterGrid:
     """The values of α and β that are tried."""
 
     alphas: Float[np.ndarray, " A"]
@@ -250,18 +250,6 @@ def join_by_name(mine: dict[str, Part], others: Mapping[str, Part]) -> None:
             mine[name].join(other)
         else:
             mine[name] = other
-
-
-def replay(
-    recordings: Iterable[Recording], statistic: AnyStatistic, rule: Rule, grid: Grid
-) -> dict[str, Tally]:
-    """What a rule does at each α and β, by the names of the recordings."""
-    tallies: dict[str, Tally] = {}
-    for recording in recordings:
-        values = recording.values(statistic)
-        first = first_firings(values, recording.alive, rule, grid.alphas, grid.betas)
-        tallies.setdefault(recording.name, Tally(shape=grid.shape)).add(recording, first)
-    return tallies
 
 
 def _share(part: np.ndarray, whole: np.ndarray) -> Float[np.ndarray, "A B"]:

@@ -51,7 +51,7 @@ def is_rough(
     return rough
 
 
-def facing(
+def align_to_entry(
     recording: Recording, values: Float[np.ndarray, "T N M"], way: Way
 ) -> tuple[Recording, Float[np.ndarray, "T N M"]]:
     """The recording with what is to be noticed as its rough ground, and the values beside it.

@@ -7,7 +7,13 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.chatter import Said, chattered, ever_fires, in_turn, shifts
+from gaitshift.lab.identification.chatter import (
+    RecordedValues,
+    chattered,
+    ever_fires,
+    in_turn,
+    shifts,
+)
 from gaitshift.lab.identification.firings import (
     Tally,
     detections,
@@ -15,7 +21,7 @@ from gaitshift.lab.identification.firings import (
     join_by_name,
     steps_alive,
 )
-from gaitshift.lab.identification.ground import facing
+from gaitshift.lab.identification.ground import align_to_entry
 from gaitshift.lab.identification.passage import longest_passage, passage_scores
 from gaitshift.lab.identification.recording import Recording
 from gaitshift.lab.identification.statistics import auc, auc_interval
@@ -133,13 +139,13 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[Recording]) -> Rep
                     f"{', '.join(missing)}"
                 )
             values = one.candidate.values(recording)
-            seen, faced = facing(recording, values, one.way)
+            seen, aligned = align_to_entry(recording, values, one.way)
             course = replayed.courses[name].setdefault(
                 seen.name, OnCourse(course=seen.name, tally=Tally(shape=(1, 1)))
             )
-            _add(course, one, seen, faced)
+            _add(course, one, seen, aligned)
             if one.way == "flat" or ever_fires(recording, rule, values):
-                watched = one.candidate.statistic or Said(values=values)
+                watched = one.candidate.statistic or RecordedValues(values=values)
                 count = shifts(recording, in_turn(rule, watched, one.way))
                 course.shifts += int(count.sum())
                 course.chattered += int(chattered(recording, count).sum())
@@ -172,7 +178,7 @@ def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
 
 
 def _add(course: OnCourse, one: Tuned, seen: Recording, values: Float[np.ndarray, "T N M"]) -> None:
-    """Takes in how a condition did on a recording that shows what it is to notice (`facing`)."""
+    """Takes in how a condition did on a recording that shows what it is to notice (`align_to_entry`)."""
     alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
     first = first_firings(values, seen.alive, one.rule, alpha, beta)
     course.tally.add(seen, first)
