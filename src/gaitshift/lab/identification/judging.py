@@ -178,7 +178,7 @@ def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
 
 
 def _add(course: OnCourse, one: Tuned, seen: Recording, values: Float[np.ndarray, "T N M"]) -> None:
-    """Takes in how a condition did on a recording that shows what it is to notice (`align_to_entry`)."""
+    """Adds what a condition did on a recording from `align_to_entry`."""
     alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
     first = first_firings(values, seen.alive, one.rule, alpha, beta)
     course.tally.add(seen, first)
