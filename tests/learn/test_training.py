@@ -18,7 +18,7 @@ from gaitshift import table
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
-from gaitshift.lab.benchmark.vec_env import GaitVecEnv
+from gaitshift.lab.benchmark.baseline import GaitVecEnv
 from gaitshift.learn.ground import draw_grounds, stage_at
 from gaitshift.learn.learner import Learner
 from gaitshift.learn.progress import last

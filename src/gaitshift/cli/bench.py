@@ -19,7 +19,15 @@ from gaitshift.lab.benchmark.outcome import (
     row_of,
     summary,
 )
-from gaitshift.lab.benchmark.speed import SpeedConfig, environment_speed, training_speed
+from gaitshift.lab.benchmark.speed import (
+    ALPHAS,
+    BETAS,
+    EPISODES,
+    SpeedConfig,
+    environment_speed,
+    replay_speed,
+    training_speed,
+)
 
 if TYPE_CHECKING:
     from gaitshift.lab.benchmark.time_to_gait import TimeToGait
@@ -141,12 +149,11 @@ class Bench:
 
     def _measure_replay(self) -> None:
         try:
-            from gaitshift.lab.benchmark.replay import ALPHAS, BETAS, EPISODES, replay_speed
+            seconds = replay_speed(self.speed.seed)
         except ImportError as error:
             raise GaitshiftError(
                 f"the replay needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        seconds = replay_speed(self.speed.seed)
         if self.json:
             emit_json(seconds)
             return

@@ -56,7 +56,7 @@ class Study:
     def run(self) -> None:
         """Crosses, and tells what came of it."""
         try:
-            from gaitshift.lab.studies.crossing import Way, cross, ways
+            from gaitshift.lab.studies.crossing import Strategy, cross, strategies
             from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, page, row_of
         except ImportError as error:
             raise GaitshiftError(
@@ -66,7 +66,7 @@ class Study:
         for amplitude in self.amplitudes:
             if not 0 <= amplitude <= 1:
                 raise GaitshiftError(f"amplitudes must be 0 to 1 m, got {amplitude:g}")
-        every = ways(self.flat_gait, self.rough_gait, self.conditions)
+        every = strategies(self.flat_gait, self.rough_gait, self.conditions)
         loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
         path = self.out / TABLE
         check_table_folder(path, overwrite=self.overwrite)
@@ -79,7 +79,7 @@ class Study:
             overwrite=self.overwrite,
         )
 
-        def crossed(way: Way, amplitude: float, report: Report) -> Row:
+        def crossed(way: Strategy, amplitude: float, report: Report) -> Row:
             crossings = cross(
                 loaded, way, amplitude=amplitude, runs=self.runs, seed=self.seed, report=report
             )

@@ -45,7 +45,7 @@ def judge(
     earlier: EarlierRuns,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[JudgedPolicy]:
-    """Lets every policy of the paper's setting walk on flat ground, but for those of earlier runs."""
+    """Evaluates each policy of the paper's setting on flat ground, but for those of earlier runs."""
     wanted = list(_policies(results))
     judged: list[JudgedPolicy] = []
     plan = results.plan

@@ -30,7 +30,7 @@ BATCH = 256
 
 
 @dataclass(frozen=True)
-class Way:
+class Strategy:
     """How robots choose their gait."""
 
     name: str
@@ -46,15 +46,15 @@ class Way:
         return (self.start,) if self.graph is None else self.graph.gaits
 
 
-def ways(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Way, ...]:
+def strategies(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Strategy, ...]:
     """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
     seen = Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0)
     by = {name: load_condition(name) for name in conditions} | {"oracle": seen}
     return (
-        Way(f"{flat} only", flat),
-        Way(f"{rough} only", rough),
+        Strategy(f"{flat} only", flat),
+        Strategy(f"{rough} only", rough),
         *(
-            Way(name, flat, GaitGraph.of(condition, flat=flat, rough=rough))
+            Strategy(name, flat, GaitGraph.of(condition, flat=flat, rough=rough))
             for name, condition in by.items()
         ),
     )
@@ -80,7 +80,7 @@ class Crossings:
 
 def cross(
     policies: Mapping[str, Policy],
-    way: Way,
+    way: Strategy,
     *,
     amplitude: float,
     runs: int,
@@ -98,7 +98,7 @@ def cross(
 
 
 def _batch(
-    policies: Mapping[str, Policy], way: Way, amplitude: float, n: int, *, seed: int
+    policies: Mapping[str, Policy], way: Strategy, amplitude: float, n: int, *, seed: int
 ) -> Crossings:
     rng = np.random.default_rng(seed)
     way_to_go = BEFORE + NOISE + AFTER

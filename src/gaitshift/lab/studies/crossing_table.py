@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.lab.identification import wilson
-from gaitshift.lab.studies.crossing import AFTER, BEFORE, NOISE, PATIENCE, Crossings, Way
+from gaitshift.lab.studies.crossing import AFTER, BEFORE, NOISE, PATIENCE, Crossings, Strategy
 from gaitshift.table import Row, markdown
 
 COLUMNS: dict[str, type] = {
@@ -37,7 +37,7 @@ ENOUGH = 2
 """Shifts that one stretch of noise is worth; more are chatter."""
 
 
-def row_of(way: Way, amplitude: float, seed: int, crossings: Crossings) -> Row:
+def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> Row:
     """What came of the crossings of one way."""
     n, fell = len(crossings.fell), int(crossings.fell.sum())
     low, high = wilson(np.array([float(n - fell)]), np.array([float(n)]))
