@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from gaitshift.gait import RewardMachine
-from gaitshift.gait.feet import feet_label
+from gaitshift.gait.elements import feet_label
 from gaitshift.robot.legs import LABEL_COUNT, label_of
 
 BRIEF = 3

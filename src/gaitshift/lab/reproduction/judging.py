@@ -45,7 +45,7 @@ def judge(
     earlier: EarlierRuns,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[JudgedPolicy]:
-    """Evaluates each policy of the paper's setting on flat ground, but for those of earlier runs."""
+    """Evaluates the policies of the paper's setting on flat ground, less those of earlier runs."""
     wanted = list(_policies(results))
     judged: list[JudgedPolicy] = []
     plan = results.plan
