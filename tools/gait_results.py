@@ -15,6 +15,7 @@ from gaitshift.lab.evaluation import SIZES
 from gaitshift.lab.gait_analysis import FIRST_GAITS
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.legs import LEGS
+from gaitshift.table import markdown
 
 POLICIES = Path(policy.__file__).parent / "policies"
 PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"
@@ -36,7 +37,8 @@ by `tools/gait_results.py` from the records beside the policies.
 
 - *Clean*: the contacts are those of the gait, and every limit is kept. Trot, pace and bound have
   stricter limits than the others (`src/gaitshift/lab/gait_analysis/limits.py`). The others have
-  none on noise of 0.15 m and more, slopes, stairs and steps (`src/gaitshift/lab/evaluation/trials.py`).
+  none on noise of 0.15 m and more, slopes, stairs and steps
+  (`src/gaitshift/lab/evaluation/trials.py`).
 - *Cycles*: rounds of the machine a second.
 - *Pattern*: the share of control steps whose contacts are a stance of the gait.
 - *Touchdowns*: onsets of contact over those that the machine asks for in a cycle; 1 without
@@ -211,8 +213,7 @@ def _feet(values: list[float]) -> str:
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    return markdown(head, rows) + "\n"
 
 
 if __name__ == "__main__":

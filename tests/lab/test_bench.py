@@ -16,9 +16,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.benchmark import replay
 from gaitshift.lab.benchmark import time_to_gait as race
-from gaitshift.lab.benchmark.baseline import ROBOTS, Baseline
-from gaitshift.lab.benchmark.check import Check, Figures
-from gaitshift.lab.benchmark.ours import Ours
+from gaitshift.lab.benchmark.baseline import ROBOTS, Baseline, GaitVecEnv
 from gaitshift.lab.benchmark.outcome import (
     COLUMNS,
     Outcome,
@@ -31,18 +29,21 @@ from gaitshift.lab.benchmark.outcome import (
 )
 from gaitshift.lab.benchmark.time_to_gait import (
     BASELINE,
-    OURS,
+    GAITSHIFT,
+    Criterion,
+    Figures,
     TimeToGait,
     fingerprint,
     time_to_gait,
 )
-from gaitshift.lab.benchmark.vec_env import GaitVecEnv
-from gaitshift.lab.table import read_rows, write_rows
+from gaitshift.lab.benchmark.trainer import GaitshiftTrainer
 from gaitshift.learn.export import describe, write
 from gaitshift.learn.recipe import Recipe, Stage
 from gaitshift.show.plots import time_to_gait_figure
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.table import read_typed
+from gaitshift.table import write as write_table
 
 TROT = gaits.load("trot")
 SMALL = Recipe(stages=(Stage(name="flat", iterations=4),), robots=4, steps=5, threads=1)
@@ -128,7 +129,7 @@ def test_both_learners_repeat_themselves_from_a_seed(tmp_path):
         return loaded(seen[:, : loaded.observation.size])
 
     for build in (
-        lambda seed: Ours(TROT, SMALL, seed, tmp_path, iterations=2),
+        lambda seed: GaitshiftTrainer(TROT, SMALL, seed, tmp_path, iterations=2),
         lambda seed: Baseline(TROT, SMALL, seed, tmp_path, rollout=32),
     ):
         first = acts(build(0))
@@ -154,11 +155,11 @@ def test_both_learners_repeat_themselves_from_a_seed(tmp_path):
 )
 def test_a_check_is_passed_by_all_three_figures_at_once(survival, speed, pattern, passed):
     figures = Figures(survival=survival, speed=speed, pattern_fraction=pattern)
-    assert Check().is_passed(figures, 1.2) is passed
+    assert Criterion().is_passed(figures, 1.2) is passed
 
 
 def test_one_fall_of_the_robots_checked_is_one_too_many():
-    assert (Check().robots - 1) / Check().robots < Check().survival
+    assert (Criterion().robots - 1) / Criterion().robots < Criterion().survival
 
 
 class Scripted:
@@ -177,7 +178,7 @@ class Scripted:
         return self.file
 
 
-class ScriptedCheck(Check):
+class ScriptedCheck(Criterion):
     """Takes an hour, and is passed the third time."""
 
     def see(self, policy):
@@ -210,7 +211,7 @@ clock = Clock()
 def test_only_training_is_timed_up_to_the_first_passed_check_or_the_limit(
     limits, expected, tmp_path, monkeypatch
 ):
-    file = Ours(TROT, SMALL, 0, tmp_path, iterations=1).export()
+    file = GaitshiftTrainer(TROT, SMALL, 0, tmp_path, iterations=1).export()
     monkeypatch.setattr(race, "time", clock)
     clock.now, clock.checks = 0.0, 0
     entry = race._Entry(name="x", build=lambda *_: Scripted(clock, file), **limits)
@@ -227,13 +228,13 @@ def test_of_robots_that_all_fall_at_once_the_line_and_the_table_say_what_there_i
         layer.weight.zero_()
         layer.bias.copy_(torch.from_numpy(FOLD))
     write([layer], describe(env, {}), tmp_path / "fold.onnx")
-    figures = Check(robots=2, seconds=2.5).see(policy.load(tmp_path / "fold.onnx"))
+    figures = Criterion(robots=2, seconds=2.5).see(policy.load(tmp_path / "fold.onnx"))
     assert figures == Figures(survival=0.0, speed=None, pattern_fraction=None)
     fallen = replace(outcome(reached=False), survival=0.0, speed=None, pattern_fraction=None)
     assert _text(fallen) == "> 10 s, > 0.01 M steps (survival 0.00, – m/s, pattern –)"
-    write_rows(tmp_path / "table.csv", COLUMNS, [row_of(fallen)])
+    write_table(tmp_path / "table.csv", [row_of(fallen)], COLUMNS)
     assert (tmp_path / "table.csv").read_text().splitlines()[1].endswith(",0.0,,,0123456789ab")
-    (row,) = read_rows(tmp_path / "table.csv", COLUMNS, "trainings")
+    (row,) = read_typed(tmp_path / "table.csv", COLUMNS, "trainings")
     assert outcome_of(row) == fallen
     with pytest.raises(GaitshiftError, match="column 'seconds' must not be empty"):
         outcome_of(row | {"seconds": ""})
@@ -243,13 +244,13 @@ def test_a_fingerprint_is_of_recipe_check_machine_and_the_learners_own_rollout()
     config = TimeToGait()
 
     def prints(config, machine=TROT):
-        return [fingerprint(config, learner, machine) for learner in (OURS, BASELINE)]
+        return [fingerprint(config, learner, machine) for learner in (GAITSHIFT, BASELINE)]
 
     first = prints(config)
     assert first == prints(TimeToGait(seeds=7, baseline_budget=3.0, gaits=("pace",)))
     both = [
         prints(replace(config, recipe=replace(config.recipe, strict_from=61))),
-        prints(replace(config, check=Check(robots=63))),
+        prints(replace(config, check=Criterion(robots=63))),
         prints(config, gaits.load("pace")),
     ]
     assert all(len({*first, *changed}) == 4 for changed in both)
@@ -269,16 +270,16 @@ def test_trainings_of_another_recipe_are_measured_anew_and_stay_in_the_table(
 
     monkeypatch.setattr(race, "_train", told)
     table = tmp_path / "time_to_gait.csv"
-    write_rows(table, COLUMNS, [row_of(outcome(seconds=40.0))])
+    write_table(table, [row_of(outcome(seconds=40.0))], COLUMNS)
     command = ["bench", "time-to-gait", "--quick", "--out", str(tmp_path)]
     for _ in range(2):  # what the first call measured, the second knows
         main(command)
         capsys.readouterr()
-        rows = read_rows(table, COLUMNS, "trainings")
+        rows = read_typed(table, COLUMNS, "trainings")
         assert [(r["learner"], r["seconds"]) for r in rows] == [
-            (OURS, 1.0),
+            (GAITSHIFT, 1.0),
             (BASELINE, 1.0),
-            (OURS, 40.0),
+            (GAITSHIFT, 40.0),
         ]
         assert [r["recipe"] == "0123456789ab" for r in rows] == [False, False, True]
 
@@ -372,8 +373,8 @@ def test_the_table_and_the_figure_show_every_training(tmp_path):
         )
         for seed, seconds in enumerate((base, 1.3 * base))
     ]
-    write_rows(tmp_path / "time_to_gait.csv", COLUMNS, [row_of(o) for o in outcomes])
-    rows = read_rows(tmp_path / "time_to_gait.csv", COLUMNS, "trainings")
+    write_table(tmp_path / "time_to_gait.csv", [row_of(o) for o in outcomes], COLUMNS)
+    rows = read_typed(tmp_path / "time_to_gait.csv", COLUMNS, "trainings")
     assert [outcome_of(row) for row in rows] == outcomes
     figure = time_to_gait_figure(outcomes, tmp_path / "time_to_gait.png")
     axes = figure.axes[0]
@@ -422,7 +423,7 @@ def test_the_quick_measurement_runs_from_the_command_to_the_figure(capsys, tmp_p
 
 def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):
     table = tmp_path / "time_to_gait.csv"
-    write_rows(table, COLUMNS, [row_of(outcome())])
+    write_table(table, [row_of(outcome())], COLUMNS)
     table.write_text(table.read_text().replace("True", "yes"))
     line = refusal(capsys, "time-to-gait", "--quick", "--out", str(tmp_path))
     assert str(table) in line
@@ -430,7 +431,7 @@ def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):
 
 
 def test_ours_alone_is_measured_and_a_check_that_asks_for_nothing_is_passed_at_once():
-    anything = Check(survival=0.0, speed_error=9.0, pattern_fraction=0.0, robots=2, seconds=2.2)
+    anything = Criterion(survival=0.0, speed_error=9.0, pattern_fraction=0.0, robots=2, seconds=2.2)
     config = replace(TimeToGait.quick(), baseline_budget=0.0, check=anything)
     (found,) = time_to_gait(config)
     assert found.reached

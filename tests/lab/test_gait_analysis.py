@@ -18,9 +18,9 @@ from gaitshift.lab.gait_analysis import (
     measure,
     name_gait,
 )
-from gaitshift.lab.gait_analysis.pattern import share_in_order
+from gaitshift.lab.gait_analysis.naming import share_in_order
 from gaitshift.lab.gait_analysis.phase import Phases, axial_of, ideal_of, phase_errors
-from gaitshift.lab.gait_analysis.steps import steady
+from gaitshift.lab.gait_analysis.sample import steady
 from gaitshift.lab.log import Log
 from synthetic import TABLE, contacts, log_of
 

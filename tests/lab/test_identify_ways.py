@@ -19,10 +19,10 @@ from test_identify import (
 
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import Grid, Tally, choose, passages
+from gaitshift.lab.identification import ParameterGrid, Tally, choose, passages
 from gaitshift.lab.identification.candidates import BETAS, CANDIDATES
 from gaitshift.lab.identification.chatter import chattered, shifts
-from gaitshift.lab.identification.facing import facing
+from gaitshift.lab.identification.ground import align_to_entry
 from gaitshift.lab.identification.passage import best_beta, passage_grid, passage_scores
 from gaitshift.lab.identification.report import (
     condition_cells,
@@ -68,30 +68,30 @@ def test_on_the_way_to_flat_ground_each_robot_begins_where_it_comes_to_rough_gro
     rec.rough[:, 2] = False  # never comes to it
     rec.alive[600:, 3] = False
     values = np.arange(1400.0)[:, None, None] * np.ones((1, 4, 1))
-    seen, faced = facing(rec, values, "flat")
+    seen, aligned = align_to_entry(rec, values, "flat")
     assert seen.rough[:, 0].tolist() == [False] * 400 + [True] * 1000
     assert seen.rough[:400, 1].tolist() == [False] * 350 + [True] * 50
     assert seen.alive.sum(axis=0).tolist() == [1000, 950, 0, 200]
     np.testing.assert_allclose(seen.distance[[0, 100], 0], [0.0, 1.0])
     np.testing.assert_allclose(seen.distance[[0, 100], 1], [0.0, 1.0])
-    assert faced[[0, 10], :2, 0].tolist() == [[400.0, 450.0], [410.0, 460.0]]
+    assert aligned[[0, 10], :2, 0].tolist() == [[400.0, 450.0], [410.0, 460.0]]
 
 
 def test_on_the_way_to_rough_ground_each_robot_begins_where_it_first_walks_on_smooth_ground():
     """What it starts on it has not come to; rough ground alone counts as it is."""
     rec = crossing(robots=4)
     values = np.arange(1400.0)[:, None, None] * np.ones((1, 4, 1))
-    assert facing(rec, values, "rough")[0] is rec, "all start on smooth ground"
+    assert align_to_entry(rec, values, "rough")[0] is rec, "all start on smooth ground"
     rec.rough[:300, 1] = True
     rec.rough[:, 2] = True
     rec.alive[600:, 1] = False
-    seen, faced = facing(rec, values, "rough")
+    seen, aligned = align_to_entry(rec, values, "rough")
     assert seen.rough[:, 0].tolist() == rec.rough[:, 0].tolist()
     assert seen.rough[:600, 1].tolist() == [False] * 100 + [True] * 400 + [False] * 100
     assert seen.rough[:, 2].all()
     assert seen.alive.sum(axis=0).tolist() == [1400, 300, 1400, 1400]
     np.testing.assert_allclose(seen.distance[[0, 100], 1], [0.0, 1.0])
-    assert faced[[0, 10], 1, 0].tolist() == [300.0, 310.0]
+    assert aligned[[0, 10], 1, 0].tolist() == [300.0, 310.0]
 
 
 def test_rough_ground_that_a_table_begins_on_was_not_come_to(tmp_path):
@@ -162,7 +162,7 @@ def test_identify_finds_the_way_back_in_a_table_of_smooth_rough_and_smooth_groun
     assert "Passages of level ground" in (out / "page.html").read_text()
 
 
-GRID = Grid(alphas=np.array([0.01, 0.03, 0.0305, 0.06]), betas=np.array([0.0, 1.0]))
+GRID = ParameterGrid(alphas=np.array([0.01, 0.03, 0.0305, 0.06]), betas=np.array([0.0, 1.0]))
 
 
 def test_the_headroom_of_the_way_back_lies_at_a_larger_alpha():

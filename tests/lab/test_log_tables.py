@@ -7,8 +7,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import passages, table
+from gaitshift.lab.identification import log_files, passages
 from gaitshift.robot.legs import LEGS
 
 FEET = np.array(
@@ -123,7 +124,7 @@ def test_whole_numbers_are_numbers(tmp_path):
 
 def test_contacts_and_labels_may_be_true_and_false(tmp_path):
     data = columns()
-    for name in (*table.CONTACTS, "rough"):
+    for name in (*log_files.CONTACTS, "rough"):
         data[name] = [str(bool(value)).lower() for value in data[name]]
     (plain, _), (words, _) = (passages(written(tmp_path, d)) for d in (columns(), data))
     np.testing.assert_array_equal(words.contact, plain.contact)
@@ -219,7 +220,7 @@ def test_a_faulty_table_is_named_with_its_row_or_column(tmp_path, change, messag
         ("empty.csv", b"", "cannot be read as csv"),
         (
             "head.csv",
-            ("time," + ",".join(table.REQUIRED[1:]) + ",roll,pitch\n").encode(),
+            ("time," + ",".join(log_files.REQUIRED[1:]) + ",roll,pitch\n").encode(),
             "must have two rows or more, .*got 0",
         ),
         ("noise.parquet", b"\x00\x01 this is none", "cannot be read as parquet"),

@@ -11,7 +11,7 @@ from scipy import stats
 from gaitshift.cli import main
 from gaitshift.control import policy
 from gaitshift.lab.evaluation import DemoConfig, run_demo
-from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, ways
+from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, strategies
 from gaitshift.lab.studies.crossing_table import COLUMNS, mean_of, row_of
 from gaitshift.show.plots.crossings import crossings_figure
 
@@ -92,14 +92,14 @@ def test_intervals_of_means_are_scipys():
 def test_more_shifts_than_there_and_back_are_chatter(log):
     out = measure_crossings(log, 3.0)
     four = {f.name: np.resize(getattr(out, f.name), 4) for f in fields(out)}
-    way = ways("trot", "bound", ())[0]
+    way = strategies("trot", "bound", ())[0]
     row = row_of(way, 0.1, 0, Crossings(**four | {"shifts": np.array([2, 3, 0, 5])}))
     assert (row["chattered"], row["shifts"], row["runs"]) == (2, 2.5, 4)
 
 
 def test_only_the_oracle_shifts_where_the_noise_is_seen():
     """On level ground nobody does; over noise the oracle goes there and back once."""
-    alone, _, height, oracle = ways("trot", "bound", ("height_difference",))
+    alone, _, height, oracle = strategies("trot", "bound", ("height_difference",))
     for way in (alone, height, oracle):
         assert cross(BOTH, way, amplitude=0.0, runs=4, seed=1).shifts.tolist() == [0] * 4
     assert cross(BOTH, oracle, amplitude=0.1, runs=4, seed=1).shifts.tolist() == [2] * 4

@@ -13,9 +13,9 @@ from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.studies import Pair, run_pair
 from gaitshift.lab.studies.transition_table import COLUMNS
 from gaitshift.lab.studies.transitions import measure_shifts, running_mean
-from gaitshift.lab.table import read_rows
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.show.plots.transitions import transition_map
+from gaitshift.table import read_typed
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 
@@ -192,13 +192,13 @@ def test_the_map_shades_failures_and_counts_them(tmp_path):
     assert np.isnan(np.ma.filled(shades, np.nan)[0, 0])
 
 
-def test_read_rows_gives_what_was_written(tmp_path):
-    assert read_rows(tmp_path / "none.csv", COLUMNS, "shifts") == []
+def test_read_typed_gives_what_was_written(tmp_path):
+    assert read_typed(tmp_path / "none.csv", COLUMNS, "shifts") == []
     path = tmp_path / "transitions.csv"
     with path.open("w", newline="") as file:
         lines = csv.writer(file)
         lines.writerow(COLUMNS)
         lines.writerow(["a", "b", "flat", 0, 8, 0, 0.0, 0.3, 8, "", "", 0.4, 80.0, "0 to 0.1", 0.0])
-    (row,) = read_rows(path, COLUMNS, "shifts")
+    (row,) = read_typed(path, COLUMNS, "shifts")
     assert row["switches"] == 8
     assert row["settle_s"] == ""

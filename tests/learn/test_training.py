@@ -14,13 +14,14 @@ import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 from tensordict import TensorDict
 
+from gaitshift import table
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
-from gaitshift.lab.benchmark.vec_env import GaitVecEnv
+from gaitshift.lab.benchmark.baseline import GaitVecEnv
 from gaitshift.learn.ground import draw_grounds, stage_at
 from gaitshift.learn.learner import Learner
-from gaitshift.learn.lines import append, last
+from gaitshift.learn.progress import last
 from gaitshift.learn.recipe import PRESETS, PpoConfig, Recipe, Stage
 from gaitshift.learn.run import Run
 from gaitshift.sim.env import EnvConfig, GaitEnv
@@ -587,7 +588,7 @@ def test_the_last_line_comes_back_as_it_was_written(tmp_path):
         {"iteration": 6, "stage": "rough", "speed": None, "gait": "", "clean": True},
     ]
     for line in lines:
-        append(tmp_path / "lines.csv", line)
+        table.append(tmp_path / "lines.csv", line)
     for iteration, line in ((3, 0), (4, 1), (5, 1), (9, 2)):
         found = last(tmp_path / "lines.csv", iteration)
         assert found == lines[line]

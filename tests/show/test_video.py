@@ -19,7 +19,7 @@ from gaitshift.show.video.camera import follow
 from gaitshift.show.video.canvas import Ball, Canvas, View
 from gaitshift.show.video.film import FilmWriter, read_film
 from gaitshift.show.video.paint import Paint
-from gaitshift.show.video.stage import SUN, build_stage
+from gaitshift.show.video.scene import SUN, build_scene
 from gaitshift.show.video.strip import Reading, Strip
 from gaitshift.sim.terrain import flat, from_spec
 from waiting import PATIENCE
@@ -132,7 +132,7 @@ def test_flat_ground_fills_the_picture_to_the_horizon(gl, tmp_path):
 
 def test_what_is_painted_at_a_place_is_seen_at_that_place(gl):
     terrain = from_spec("perlin:0.05", seed=0, length=12.0, width=6.0)
-    stage = build_stage(ANYMAL_B, terrain, np.array([[6.0, 0.0], [6.0, 0.0]]), 640, 480)
+    stage = build_scene(ANYMAL_B, terrain, np.array([[6.0, 0.0], [6.0, 0.0]]), 640, 480)
     paint, data = Paint(stage), mujoco.MjData(stage.model)
     mujoco.mj_forward(stage.model, data)
     place = np.array([3.0, 1.6])
@@ -155,7 +155,7 @@ def test_what_is_painted_at_a_place_is_seen_at_that_place(gl):
 
 
 def test_shadow_lies_where_the_sun_casts_it():
-    stage = build_stage(ANYMAL_B, flat(8.0, 6.0), AT_ZERO, 64, 64)
+    stage = build_scene(ANYMAL_B, flat(8.0, 6.0), AT_ZERO, 64, 64)
     paint, data = Paint(stage), mujoco.MjData(stage.model)
     texture = stage.model.tex_data[stage.model.tex_adr[stage.texture] :]
     rows, columns = (
@@ -180,7 +180,7 @@ def test_shadow_lies_where_the_sun_casts_it():
 
 
 def test_a_robot_beside_the_ground_casts_no_shadow_and_leaves_no_print():
-    stage = build_stage(
+    stage = build_scene(
         ANYMAL_B, from_spec("step:0.1", seed=0, length=4.0, width=4.0), AT_ZERO, 64, 64
     )
     paint, data = Paint(stage), mujoco.MjData(stage.model)

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import tyro
@@ -15,6 +16,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select
 from gaitshift.lab.log import Log
+from gaitshift.lab.resume import Part, Report, run_missing
+from gaitshift.table import Row
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,26 +67,22 @@ class Record:
                 f"policies must be of different gaits, got two of '{twice[0]}'; record them one by "
                 "one with different --out"
             )
-        kept = self._kept([(gait, course) for gait in gaits for course in chosen])
+        asked = [
+            (name, gait, course)
+            for name, gait in zip(self.policies, gaits, strict=True)
+            for course in chosen
+        ]
+        found = self._found([(gait, course) for _, gait, course in asked])
         self.out.mkdir(parents=True, exist_ok=True)
-        rows: list[dict[str, Any]] = []
-        for name, gait in zip(self.policies, gaits, strict=True):
-            for course in chosen:
-                path = self._path(gait, course)
-                if path in kept:
-                    say(f"{path} exists, not recorded again")
-                    rows.append(kept[path])
-                    continue
-                with progress(f"{gait}, {course.name}") as report:
-                    log = run_course(
-                        make([name], self.robots),
-                        course,
-                        seconds=self.seconds,
-                        seed=self.seed,
-                        report=report,
-                    )
-                log.save(path)
-                rows.append(_row(path, log))
+        parts = [
+            Part(
+                name=str(path := self._path(gait, course)),
+                find=partial(found.get, path),
+                work=partial(self._record, name, gait, course),
+            )
+            for name, gait, course in asked
+        ]
+        rows = run_missing(parts, progress=progress, say=say)
         if self.json:
             emit_json({"logs": rows})
         else:
@@ -96,13 +95,21 @@ class Record:
     def _path(self, gait: str, course: Course) -> Path:
         return self.out / f"{gait}-{course.name}-{self.seed}.npz"
 
-    def _kept(self, asked: Sequence[tuple[str, Course]]) -> dict[Path, dict[str, Any]]:
-        """What is told of the logs that are there already, each as long and of as many as asked.
+    def _record(self, name: str, gait: str, course: Course, report: Report) -> Row:
+        """Records a log and writes it."""
+        controller = controller_maker(self.controller)([name], self.robots)
+        log = run_course(controller, course, seconds=self.seconds, seed=self.seed, report=report)
+        path = self._path(gait, course)
+        log.save(path)
+        return _row(path, log)
+
+    def _found(self, asked: Sequence[tuple[str, Course]]) -> dict[Path, Row]:
+        """Rows of the logs that are there already, each as long and of as many robots as asked.
 
         Raises:
             GaitshiftError: one holds something else.
         """
-        kept: dict[Path, dict[str, Any]] = {}
+        found: dict[Path, Row] = {}
         steps = RolloutConfig(seconds=self.seconds).steps
         for gait, course in asked:
             path = self._path(gait, course)
@@ -116,11 +123,11 @@ class Record:
                     f"{path} has {robots} robots × {log.time[-1]:g} s, got {self.robots} × "
                     f"{self.seconds:g} s; give the same robots and seconds, or --overwrite"
                 )
-            kept[path] = _row(path, log)
-        return kept
+            found[path] = _row(path, log)
+        return found
 
 
-def _row(path: Path, log: Log) -> dict[str, Any]:
+def _row(path: Path, log: Log) -> Row:
     last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
     x = np.take_along_axis(log.truth.base_position_w[..., 0].astype(float), last[None], axis=0)[0]
     return {

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from gaitshift.cli.output import emit_json, say
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import glance
+from gaitshift.lab.evaluation import flat_verdict
 from gaitshift.robot.robot_file import use_robot_file
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ class _Bar:
     """Progress of a training: steps/s, speed, survival, the last verdict and time left."""
 
     def __init__(self, run: "Run") -> None:
-        from gaitshift.learn.lines import last
+        from gaitshift.learn.progress import last
         from gaitshift.learn.run import PROGRESS, VERDICTS
 
         self.row: Row = last(run.folder / PROGRESS, run.iteration)
@@ -153,7 +153,7 @@ class _Bar:
 
     def judge(self, path: Path) -> "Row":
         """A short look at the policy as it stands."""
-        self.verdict = glance(path)
+        self.verdict = flat_verdict(path)
         return self.verdict
 
     def __call__(self, row: "Row") -> None:

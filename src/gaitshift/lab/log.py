@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -153,14 +153,13 @@ def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
             entries = np.load(file)
             if not isinstance(entries, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
-            given: Any = entries.get("format_version")
-            version = None if given is None else int(given)
-            if version is None and "qpos" in entries:
+            version = int(cast(Any, entries).get("format_version", 1))
+            if version == 1 and "qpos" in entries:
                 raise GaitshiftError(
                     f"{path} is a log of gaitshift 0.1, which later versions do not read; write it "
                     "anew with the command that made it (demo, record or evaluate --log)"
                 )
-            if version not in (None, FORMAT_VERSION):
+            if version not in (1, FORMAT_VERSION):
                 raise GaitshiftError(
                     f"{path} is a log of format {version}; this version reads format "
                     f"{FORMAT_VERSION}"

@@ -16,17 +16,19 @@ import numpy as np
 import torch
 from torch.utils.tensorboard import SummaryWriter
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
 from gaitshift.learn.ground import FIELD, draw_grounds, stage_at
 from gaitshift.learn.learner import Learner
-from gaitshift.learn.lines import Row, append, last, trim
+from gaitshift.learn.progress import last, trim
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import from_dict, to_dict, use_robot
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.table import Row
 
 CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
 PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
@@ -267,7 +269,7 @@ class Run:
         self.learner.env.push_at_most(stage.push)
 
     def _log(self, row: Row, writer: SummaryWriter) -> None:
-        append(self.folder / PROGRESS, row)
+        table.append(self.folder / PROGRESS, row)
         for name, value in row.items():
             if name not in ("iteration", "stage"):
                 writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
@@ -280,7 +282,7 @@ class Run:
     def _write_verdict(self, judge: Judge) -> None:
         self.export()
         verdict = judge(self.folder / POLICY)
-        append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
+        table.append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
 
 
 def _read_checkpoint(path: Path) -> dict[str, Any]:

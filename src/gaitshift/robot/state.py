@@ -83,9 +83,9 @@ class Batch:
             if isinstance(value, Batch):
                 values[name] = value._map(change, also_time=also_time)
             elif isinstance(value, np.ndarray) and trailing is not None:
-                values[name] = change(trailing, value)
+                values[name] = change(trailing, cast(Any, value))
             elif isinstance(value, np.ndarray) and name == "time" and also_time:
-                time = change(0, value)
+                time = change(0, cast(Any, value))
                 values[name] = time if time.ndim else float(time)
         return replace(cast(Any, self), **values)
 

@@ -3,12 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.control import Controller, Driver
+from gaitshift.control import Controller, Driver, policy
 from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
@@ -189,3 +190,43 @@ def _check_length(ground: Terrain, spec: str, *, speed: float, seconds: float) -
             f"{speed:g} m/s, {RUN_UP:g} m of it behind the start, got {ground.size[0]:g} m; give a "
             "longer terrain or fewer seconds"
         )
+
+
+VERDICT_ROBOTS, VERDICT_SECONDS = 16, 5.0
+"""Robots and length [s]; ours: seven to twelve strides of each after the 2 s left out."""
+
+VERDICT_FIGURES = (
+    "survival",
+    "speed_mean",
+    "pattern_fraction",
+    "cycles_per_s",
+    "cost_of_transport",
+)
+
+
+def flat_verdict(path: Path) -> dict[str, Any]:
+    """The verdict on a policy file on flat ground, at its own speed and stride frequency.
+
+    `gait` is the name by the contacts alone, `clean` whether it is the right one with all limits
+    kept, `misses` the figures that miss theirs with the worst foot, parted by "; ". The others are
+    as `gait_analysis.measure` defines them.
+    """
+    figures, _ = evaluate(
+        policy.load(path), EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS)
+    )
+    verdict = figures["verdict"]
+    return {
+        "gait": verdict["gait"],
+        "clean": verdict["clean"],
+        **{name: _rounded(figures[name]) for name in VERDICT_FIGURES},
+        "misses": "; ".join(_spell(miss) for miss in verdict["misses"]),
+    }
+
+
+def _spell(miss: dict[str, Any]) -> str:
+    parts = (miss["figure"], miss.get("foot"), _rounded(miss["value"]))
+    return " ".join(str(part) for part in parts if part is not None)
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.4g}")

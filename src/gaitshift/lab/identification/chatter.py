@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.lab.identification.grid import first_firings
+from gaitshift.lab.identification.firings import first_firings
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift import GaitGraph, Rule, load_graph, there_and_back, ways
@@ -13,7 +13,7 @@ from gaitshift.shift.statistics import Watched
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Said:
+class RecordedValues:
     """A statistic whose numbers were known before, step by step: what it says forgets nothing."""
 
     values: Float[np.ndarray, "T N M"]

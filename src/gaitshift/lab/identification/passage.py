@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.lab.identification.grid import counters, steps_alive
+from gaitshift.lab.identification.firings import counters, steps_alive
 from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.lab.identification.statistics import auc
 from gaitshift.shift import Rule

@@ -30,7 +30,7 @@ BATCH = 256
 
 
 @dataclass(frozen=True)
-class Way:
+class Strategy:
     """How robots choose their gait."""
 
     name: str
@@ -46,13 +46,13 @@ class Way:
         return (self.start,) if self.graph is None else self.graph.gaits
 
 
-def ways(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Way, ...]:
+def strategies(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Strategy, ...]:
     """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
     return (
-        Way(f"{flat} only", flat),
-        Way(f"{rough} only", rough),
+        Strategy(f"{flat} only", flat),
+        Strategy(f"{rough} only", rough),
         *(
-            Way(name, flat, between(load_graph(name), flat=flat, rough=rough))
+            Strategy(name, flat, between(load_graph(name), flat=flat, rough=rough))
             for name in dict.fromkeys((*conditions, "oracle"))
         ),
     )
@@ -78,7 +78,7 @@ class Crossings:
 
 def cross(
     policies: Mapping[str, Policy],
-    way: Way,
+    way: Strategy,
     *,
     amplitude: float,
     runs: int,
@@ -96,7 +96,7 @@ def cross(
 
 
 def _batch(
-    policies: Mapping[str, Policy], way: Way, amplitude: float, n: int, *, seed: int
+    policies: Mapping[str, Policy], way: Strategy, amplitude: float, n: int, *, seed: int
 ) -> Crossings:
     rng = np.random.default_rng(seed)
     way_to_go = BEFORE + NOISE + AFTER

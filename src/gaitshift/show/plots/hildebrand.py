@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gaitshift.gait import RewardMachine
-from gaitshift.gait.feet import feet_text
+from gaitshift.gait.elements import feet_text
 from gaitshift.lab.log import Log
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.plots.palette import INK, PAPER, QUIET, gait_colours

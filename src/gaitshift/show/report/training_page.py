@@ -1,6 +1,5 @@
 """The page of a training: what its policies do, its course, its verdicts."""
 
-import csv
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from gaitshift.show.plots.training import COURSES, numbers, read_progress
 from gaitshift.show.report.data import lines, packed, run_data, series
 from gaitshift.show.report.log_page import STRETCH_HEAD, check_kind, stretches
 from gaitshift.show.report.page import Row, facts_table, table, write_page
+from gaitshift.table import read
 
 
 def write_training_report(
@@ -71,8 +71,7 @@ def _verdicts(path: Path) -> str:
     """The verdicts that the training wrote down on its way, if it did."""
     if not path.is_file():
         return ""
-    with path.open(newline="") as file:
-        found = list(csv.DictReader(file))
+    found = read(path, may_be_cut=True)
     if not found:
         return ""
     head = tuple(name.replace("_", " ") for name in found[0])

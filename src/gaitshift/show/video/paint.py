@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image, ImageColor, ImageDraw, ImageFilter
 
-from gaitshift.show.video.stage import SUN, Stage
+from gaitshift.show.video.scene import SUN, Scene
 
 _LOW, _HIGH = np.array([126.0, 141.0, 134.0]), np.array([244.0, 232.0, 210.0])
 """Colours of the lowest and the highest ground (red, green, blue)."""
@@ -34,13 +34,13 @@ _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), 
 
 
 class Paint:
-    """Paints on the ground of a stage, in the texture's own memory."""
+    """Paints on the ground of a scene, in the texture's own memory."""
 
-    def __init__(self, stage: Stage) -> None:
-        model, terrain = stage.model, stage.terrain
-        rows = int(model.tex_height[stage.texture])
-        columns = int(model.tex_width[stage.texture])
-        start = int(model.tex_adr[stage.texture])
+    def __init__(self, scene: Scene) -> None:
+        model, terrain = scene.model, scene.terrain
+        rows = int(model.tex_height[scene.texture])
+        columns = int(model.tex_width[scene.texture])
+        start = int(model.tex_adr[scene.texture])
         texels = model.tex_data[start : start + rows * columns * 3].reshape(rows, columns, 3)
         # MuJoCo's textures begin at the far edge; here rows run along +y, as in terrains.
         self._shown: UInt8[np.ndarray, "rows columns 3"] = texels[::-1]

@@ -1,4 +1,4 @@
-"""A log played back on the stage: the robot as it stood at each entry."""
+"""A log played back on the scene: the robot as it stood at each entry."""
 
 import mujoco
 import numpy as np
@@ -13,7 +13,7 @@ from gaitshift.show.plots.signals import gait_at, ground_of
 from gaitshift.show.video.camera import follow
 from gaitshift.show.video.canvas import Ball, Canvas
 from gaitshift.show.video.paint import Paint
-from gaitshift.show.video.stage import build_stage
+from gaitshift.show.video.scene import build_scene
 
 _GLOW = 1.3
 """Radius of the light on a foot that touches, of the foot's own."""
@@ -27,19 +27,14 @@ class Playback:
         self._qpos = log.qpos[:, robot]
         self._radius = ROBOTS[log.robot].foot_radius
         self._colours = gait_colours(log.gaits)
-        stage = build_stage(
-            ROBOTS[log.robot],
-            ground_of(log),
-            log.truth.base_position_w[:, robot, :2],
-            width,
-            height,
-        )
-        self._texture = stage.texture
-        self._model, self._data = stage.model, mujoco.MjData(stage.model)
-        self._paint = Paint(stage)
+        place = log.truth.base_position_w[:, robot, :2]
+        scene = build_scene(ROBOTS[log.robot], ground_of(log), place, width, height)
+        self._texture = scene.texture
+        self._model, self._data = scene.model, mujoco.MjData(scene.model)
+        self._paint = Paint(scene)
         self._views = follow(log, robot)
         self._printed = 0
-        self._canvas = Canvas(stage.model, width, height)
+        self._canvas = Canvas(scene.model, width, height)
 
     def __enter__(self) -> "Playback":
         return self

@@ -1,6 +1,5 @@
-"""The course of runs: what each iteration was like, and the iterations that matter."""
+"""The curve of runs: what each iteration was like, and the iterations that matter."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
 
 WALKING_SPEED = 0.8
@@ -20,15 +20,15 @@ HELD_FOR = 10
 """… in this many iterations running."""
 
 LATE_SHARE = 0.1
-"""Share of a course that its end is averaged over."""
+"""Share of a curve that its end is averaged over."""
 
 DECIMALS = {"reward": 2, "speed": 3, "survival": 3, "changes_per_s": 2, "stance_fraction": 3}
-"""Columns of a course and their decimals, in memory as in tables: so a course that is read back
+"""Columns of a curve and their decimals, in memory as in tables: so a curve that is read back
 from a table says the same."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class LearningCurve:
     """One run, iteration by iteration; entry 0 is iteration 1."""
 
     reward: Float[np.ndarray, " n"]
@@ -43,17 +43,16 @@ class Course:
     """Share of steps at which the present stance of the machine is shown."""
 
     @classmethod
-    def read(cls, path: Path) -> "Course":
-        """The course in a `progress.csv`."""
+    def read(cls, path: Path) -> "LearningCurve":
+        """The curve in a `progress.csv`."""
         try:
-            with path.open(newline="") as file:
-                return cls.of(list(csv.DictReader(file)))
-        except (OSError, KeyError, ValueError, TypeError) as error:
+            return cls.of(table.read(path))
+        except (GaitshiftError, KeyError, ValueError) as error:
             raise GaitshiftError(f"{path} is no progress of a run: {error}") from error
 
     @classmethod
-    def of(cls, rows: Sequence[Mapping[str, str]]) -> "Course":
-        """The course in lines of a table, one an iteration.
+    def of(cls, rows: Sequence[Mapping[str, str]]) -> "LearningCurve":
+        """The curve in lines of a table, one an iteration.
 
         Raises:
             KeyError: a column is missing.
@@ -63,16 +62,16 @@ class Course:
         return cls(**{name: columns[name].round(DECIMALS[name]) for name in DECIMALS})
 
     @classmethod
-    def empty(cls) -> "Course":
-        """The course of a run that broke down in its first iteration."""
+    def empty(cls) -> "LearningCurve":
+        """The curve of a run that broke down in its first iteration."""
         return cls(**{name: np.zeros(0) for name in DECIMALS})
 
     def __len__(self) -> int:
         return len(self.reward)
 
-    def cut(self, iterations: int) -> "Course":
+    def cut(self, iterations: int) -> "LearningCurve":
         """The first of its iterations."""
-        return Course(**{name: getattr(self, name)[:iterations] for name in DECIMALS})
+        return LearningCurve(**{name: getattr(self, name)[:iterations] for name in DECIMALS})
 
     def late(self, column: str) -> float:
         """Mean of a column over the last tenth."""

@@ -7,7 +7,7 @@ from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import POLICY, Run
 
 
-class Ours:
+class GaitshiftTrainer:
     """A training run that keeps no record of itself but its policy."""
 
     def __init__(

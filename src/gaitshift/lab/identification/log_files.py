@@ -1,18 +1,22 @@
-"""Logs of anybody's robot: CSV or Parquet, read in a stream and cut into passages."""
+"""Recordings from files: npz logs of this package, and tables (CSV, Parquet) of any robot."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.ground import rough_ground
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way
+from gaitshift.lab.log import Log
 from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
 from gaitshift.robot.legs import JOINTS, LEGS
 from gaitshift.robot.state import Proprioception, orientation_of
 from gaitshift.shift import LegOdometry
+from gaitshift.table import STREAMED, stream
 
 _AXES = ("x", "y", "z")
 CONTACTS = tuple(f"contact_{leg}" for leg in LEGS)
@@ -36,23 +40,25 @@ SCALARS = {
 _JOINTS = ("joint_position", "joint_velocity", "joint_torque")
 """Optional signals of twelve columns: `joint_torque_FL_HAA` and so on [rad], [rad/s], [N·m]."""
 
-BATCH, BLOCK = 65_536, 1 << 24
-"""What is read at a time: rows of a Parquet file, bytes of a CSV file."""
-
 LONGEST = 60_000
 """Rows of a passage; a longer stretch is cut."""
 
 _LEAST_GRAVITY = 1e-6
 """Length below which a vector of gravity has no direction, in whatever unit it is."""
 
-_KNOWN = (
-    *REQUIRED,
+_NUMBERS = (
+    "time",
+    *FEET,
     *(name for names in ATTITUDES for name in names),
     "yaw",
     *SCALARS.values(),
     *(f"{prefix}_{axis}" for prefix in VECTORS.values() for axis in _AXES),
     *(f"{prefix}_{leg}_{joint}" for prefix in _JOINTS for leg in LEGS for joint in JOINTS),
 )
+_FLAGS = (*CONTACTS, "rough")
+"""Columns that may hold true and false."""
+
+_SEED = re.compile(r"-\d+$")
 
 
 def columns_of(signal: str) -> tuple[str, ...]:
@@ -62,6 +68,37 @@ def columns_of(signal: str) -> tuple[str, ...]:
     if signal in _JOINTS:
         return tuple(f"{signal}_{leg}_{joint}" for leg in LEGS for joint in JOINTS)
     return (SCALARS.get(signal, signal),)
+
+
+def check_sources(paths: Sequence[Path]) -> None:
+    """`GaitshiftError` unless all are files of a kind that can be read: asked before any work."""
+    for path in paths:
+        if not path.is_file():
+            raise GaitshiftError(f"no log file {path}")
+        if path.suffix not in (".npz", *STREAMED):
+            raise GaitshiftError(
+                f"{path}: the name of a log must end in .npz, {' or '.join(STREAMED)}"
+            )
+
+
+def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[LabelledRun]:
+    """What the files hold, one after the other, tables passage by passage for this way.
+
+    A recording has the name of its file, less a seed at its end.
+
+    Raises:
+        GaitshiftError: a file cannot be read, with what is wrong in it.
+    """
+    for path in paths:
+        if path.suffix in STREAMED:
+            yield from passages(path, way)
+            continue
+        log = Log.load(path)
+        if not log.sensed.contact.any():
+            raise GaitshiftError(
+                f"{path}: 'contact' must be true where a foot is down, got no contact at all"
+            )
+        yield LabelledRun.from_log(log, _SEED.sub("", path.stem), rough_ground(log))
 
 
 def passages(path: Path, way: Way = "rough") -> Iterator[LabelledRun]:
@@ -77,7 +114,7 @@ def passages(path: Path, way: Way = "rough") -> Iterator[LabelledRun]:
     columns: dict[str, list[np.ndarray]] = {}
     rows, before, period, touched, down = 0, np.nan, np.nan, False, 0.0
     may_begin_rough = way == "rough"
-    for batch in _batches(path):
+    for batch in stream(path, numbers=_NUMBERS, flags=_FLAGS):
         _check_columns(path, batch)
         period = _check_values(path, batch, rows, before, period)
         before = float(batch["time"][-1])
@@ -107,47 +144,6 @@ def passages(path: Path, way: Way = "rough") -> Iterator[LabelledRun]:
     whole = {name: np.concatenate(parts) for name, parts in columns.items()}
     if len(whole["time"]) > 1:
         yield _recording(path, whole, slice(0, len(whole["time"])))
-
-
-def _batches(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """Batches of rows, as arrays by the names of their columns."""
-    import pyarrow as pa  # only where a table is read
-    from pyarrow import csv, parquet
-
-    if not path.is_file():
-        raise GaitshiftError(f"no log file {path}")
-    from_parquet, from_csv = cast(Any, parquet), cast(Any, csv)
-    # Contacts and labels may be true and false; a number may begin as if it were a whole one.
-    arrow = cast(Any, pa)
-    numbers = {name: arrow.float64() for name in _KNOWN if name not in (*CONTACTS, "rough")}
-    try:
-        if path.suffix == ".parquet":
-            with from_parquet.ParquetFile(path) as file:
-                for batch in file.iter_batches(BATCH):
-                    yield _arrays(path, batch)
-        else:
-            read = from_csv.ReadOptions(block_size=BLOCK)
-            convert = from_csv.ConvertOptions(column_types=numbers)
-            with from_csv.open_csv(path, read_options=read, convert_options=convert) as file:
-                for batch in file:
-                    yield _arrays(path, batch)
-    except UnicodeError as error:
-        raise GaitshiftError(f"{path} must be in UTF-8: {error}") from error
-    except (arrow.ArrowException, OSError) as error:
-        line = (str(error).splitlines() or [type(error).__name__])[0]
-        raise GaitshiftError(f"{path} cannot be read as {path.suffix[1:]}: {line}") from error
-
-
-def _arrays(path: Path, batch: Any) -> dict[str, np.ndarray]:
-    read: dict[str, np.ndarray] = {}
-    for name, column in zip(batch.schema.names, batch.columns, strict=True):
-        if name not in _KNOWN:
-            continue
-        try:
-            read[name] = column.cast("float64", safe=False).to_numpy(zero_copy_only=False)
-        except Exception as error:  # arrow has an error for each type
-            raise GaitshiftError(f"{path}: column '{name}' must hold numbers") from error
-    return read
 
 
 def _check_columns(path: Path, batch: dict[str, np.ndarray]) -> None:

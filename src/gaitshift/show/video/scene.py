@@ -26,7 +26,7 @@ _FOG_CELL = 0.5
 """Distance of the samples of level ground [m]."""
 
 _REACH = 14.0
-"""How far the stage goes beyond the robot's course [m]: just further than one sees."""
+"""How far the scene goes beyond the robot's course [m]: just further than one sees."""
 
 _TEXELS = 1_200_000
 """Most points of the picture on the ground: it is drawn anew for each frame."""
@@ -36,7 +36,7 @@ _FINEST = 64.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Stage:
+class Scene:
     """A robot's model on a ground that can be painted on."""
 
     model: mujoco.MjModel
@@ -46,10 +46,10 @@ class Stage:
     """Id of the ground's texture."""
 
 
-def build_stage(
+def build_scene(
     robot: Robot, terrain: Terrain, course: Float[np.ndarray, "T 2"], width: int, height: int
-) -> Stage:
-    """The stage for a robot that walks along `course` (x, y) [m], for pictures of this size."""
+) -> Scene:
+    """The scene for a robot that walks along `course` (x, y) [m], for pictures of this size."""
     seen = _around(terrain, course)
     spec = robot.spec(robot.gains_of("default"))
     put_on(spec, robot)
@@ -81,7 +81,7 @@ def build_stage(
         pos=field.position,
     )
     model = spec.compile()
-    return Stage(model=model, terrain=seen, texture=model.texture(GROUND).id)
+    return Scene(model=model, terrain=seen, texture=model.texture(GROUND).id)
 
 
 def _set_look(spec: mujoco.MjSpec, width: int, height: int) -> None:

@@ -1,18 +1,13 @@
 """A machine as a picture: states as the feet seen from above, edges as arrows with their guards."""
 
-# matplotlib's own stubs leave **kwargs untyped:
-# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
-
 import math
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait.edge import Edge
-from gaitshift.gait.feet import feet_text
+from gaitshift.gait.elements import State, Transition, feet_text
 from gaitshift.gait.machine import RewardMachine
-from gaitshift.gait.state import State
 from gaitshift.robot.legs import LEGS
 
 if TYPE_CHECKING:
@@ -46,14 +41,16 @@ def draw(machine: RewardMachine, path: Path) -> None:
         raise GaitshiftError(f"{path}: the name of a picture must end in {' or '.join(FORMATS)}")
     if not path.parent.is_dir():
         raise GaitshiftError(f"{path}: no folder {path.parent}")
-    from matplotlib import rc_context
+    import matplotlib
     from matplotlib.figure import Figure
 
     middles = layout(machine)
     half_width = max(abs(x) for x, _ in middles.values()) + 2.6
     bottom = min(y for _, y in middles.values()) - 2.4
     top = max(y for _, y in middles.values()) + 3.6
-    with rc_context({"svg.hashsalt": "gaitshift", "font.family": "DejaVu Sans"}):
+    with cast(Any, matplotlib).rc_context(
+        {"svg.hashsalt": "gaitshift", "font.family": "DejaVu Sans"}
+    ):
         size = (2 * half_width * _INCHES, (top - bottom) * _INCHES)
         figure = Figure(figsize=size, facecolor=_PAPER)
         axes = figure.add_axes((0, 0, 1, 1))
@@ -86,7 +83,7 @@ def layout(machine: RewardMachine) -> dict[str, tuple[float, float]]:
     return dict(zip(live + ends, circle + row, strict=True))
 
 
-def _bulges(edges: tuple[Edge, ...]) -> list[tuple[Edge, float]]:
+def _bulges(edges: tuple[Transition, ...]) -> list[tuple[Transition, float]]:
     """Say how far each arrow bends to its left; the second of a pair of states bends further."""
     pairs = [(edge.source, edge.target) for edge in edges]
     return [(e, _BULGE * (1 + 1.5 * pairs[:i].count(pairs[i]))) for i, e in enumerate(edges)]
@@ -170,7 +167,7 @@ def _draw_start(axes: "Axes", middle: tuple[float, float]) -> None:
 
 def _draw_edge(
     axes: "Axes",
-    edge: Edge,
+    edge: Transition,
     cards: "dict[str, FancyBboxPatch]",
     middles: dict[str, tuple[float, float]],
     bulge: float,
@@ -197,7 +194,7 @@ def _draw_edge(
     _draw_guard(axes, edge, middle)
 
 
-def _draw_guard(axes: "Axes", edge: Edge, middle: tuple[float, float]) -> None:
+def _draw_guard(axes: "Axes", edge: Transition, middle: tuple[float, float]) -> None:
     """Draw the guard in up to three lines: feet down, feet up, dwell."""
     from matplotlib.offsetbox import AnnotationBbox, TextArea, VPacker
 
@@ -208,3 +205,16 @@ def _draw_guard(axes: "Axes", edge: Edge, middle: tuple[float, float]) -> None:
     areas = [TextArea(text, textprops={"color": colour, "size": 9}) for text, colour in lines]
     packed = VPacker(children=[*areas], align="center", pad=0, sep=3)
     axes.add_artist(AnnotationBbox(packed, middle, pad=0.25, bboxprops={"linewidth": 0}))
+
+
+def mermaid(machine: RewardMachine) -> str:
+    """Write the machine as a Mermaid `stateDiagram-v2`: a line a state, a line an edge."""
+    lines = ["stateDiagram-v2", "    direction LR"]
+    lines += [f"    {s.name} : {s.name}, {s.stance_text()}" for s in machine.states]
+    lines += [f"    [*] --> {machine.states[machine.initial].name}"]
+    lines += [
+        f"    {edge.source} --> {edge.target} : {', '.join(edge.guard.demands())}"
+        for edge in machine.edges
+    ]
+    lines += [f"    {machine.states[u].name} --> [*]" for u in machine.accepting]
+    return "\n".join(lines) + "\n"

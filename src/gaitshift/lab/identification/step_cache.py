@@ -15,7 +15,7 @@ Found = TypeVar("Found")
 Stamp = tuple[str, int, int]
 
 
-class Kept:
+class StepCache:
     """Steps of a task, each done once, even if the process ends in between.
 
     A step is done anew where what it depends on, or the code of this package, has changed.

@@ -7,18 +7,21 @@
 5. A guard does not hold in the stance of its source, or standing still would leave the state; and
    one guard on the way between two states holds in the stance of the target. So a state is the
    stance that was shown last.
+
+Besides: the cycle of a machine, what the feet do on it, and how it looks in a mirror.
 """
 
+from dataclasses import replace
 from itertools import combinations
+from math import ceil
 
 from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait.edge import Edge
-from gaitshift.gait.feet import feet_text
-from gaitshift.gait.state import State
+from gaitshift.gait.elements import State, Transition, feet_text
+from gaitshift.robot.legs import LEGS
 
 
-def check(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+def check(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
     """Raise a `GaitshiftError` naming the first law that is broken, and where."""
     _check_names(states, edges)
     _check_ways_out(states, edges)
@@ -27,7 +30,7 @@ def check(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
     _check_stances({state.name: state for state in states}, edges)
 
 
-def check_lockout(edges: tuple[Edge, ...], dwell: int, dwell_range: tuple[int, int]) -> None:
+def check_lockout(edges: tuple[Transition, ...], dwell: int, dwell_range: tuple[int, int]) -> None:
     """Refuse dwells that a commanded one, in place of the machine's own, would take away.
 
     A machine without any lock-out, in which all are 0, is lawful. Raises `GaitshiftError`.
@@ -45,7 +48,7 @@ def check_lockout(edges: tuple[Edge, ...], dwell: int, dwell_range: tuple[int, i
             )
 
 
-def _check_names(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+def _check_names(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
     if not states:
         raise GaitshiftError("there must be at least one [[state]], got none")
     names = tuple(state.name for state in states)
@@ -58,7 +61,7 @@ def _check_names(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
                 raise GaitshiftError(f"{_title(number, edge)}: {known_names('state', name, names)}")
 
 
-def _check_ways_out(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+def _check_ways_out(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
     if states[0].accepting:
         raise GaitshiftError(f"state {states[0].name}: the first state must not be accepting")
     left = {edge.source: _title(number, edge) for number, edge in enumerate(edges, start=1)}
@@ -73,7 +76,7 @@ def _check_ways_out(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
             )
 
 
-def _check_reached(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
+def _check_reached(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
     reached = {states[0].name}
     while new := {e.target for e in edges if e.source in reached} - reached:
         reached |= new
@@ -83,7 +86,7 @@ def _check_reached(states: tuple[State, ...], edges: tuple[Edge, ...]) -> None:
         )
 
 
-def _check_one_at_a_time(edges: tuple[Edge, ...]) -> None:
+def _check_one_at_a_time(edges: tuple[Transition, ...]) -> None:
     for (i, one), (j, other) in combinations(enumerate(edges, start=1), 2):
         if one.source != other.source:
             continue
@@ -95,7 +98,7 @@ def _check_one_at_a_time(edges: tuple[Edge, ...]) -> None:
             )
 
 
-def _check_stances(states: dict[str, State], edges: tuple[Edge, ...]) -> None:
+def _check_stances(states: dict[str, State], edges: tuple[Transition, ...]) -> None:
     shown = {
         (edge.source, edge.target)
         for edge in edges
@@ -115,5 +118,93 @@ def _check_stances(states: dict[str, State], edges: tuple[Edge, ...]) -> None:
             )
 
 
-def _title(number: int, edge: Edge) -> str:
+def _title(number: int, edge: Transition) -> str:
     return f"transition {number} ({edge.source} -> {edge.target})"
+
+
+def cycle(states: tuple[State, ...], edges: tuple[Transition, ...]) -> tuple[int, ...]:
+    """Numbers of the edges from the first state on, until a state comes again.
+
+    Where a state has several ways out, the one that stands first in the file is the gait's; of a
+    machine that ends instead of coming back, they are the edges until its end.
+    """
+    ways = {edge.source: number for number, edge in reversed(list(enumerate(edges)))}
+    followed: list[int] = []
+    name = states[0].name
+    while name in ways and ways[name] not in followed:
+        followed.append(ways[name])
+        name = edges[ways[name]].target
+    return tuple(followed)
+
+
+def touchdowns(
+    states: tuple[State, ...], edges: tuple[Transition, ...]
+) -> tuple[int, int, int, int]:
+    """How often each foot comes down on one cycle when the stances are shown exactly."""
+    stance = {state.name: state.stance for state in states}
+    steps = [edges[number] for number in cycle(states, edges)]
+    fl, fr, bl, br = (
+        sum(leg in stance[e.target] and leg not in stance[e.source] for e in steps) for leg in LEGS
+    )
+    return fl, fr, bl, br
+
+
+def shares(
+    states: tuple[State, ...], edges: tuple[Transition, ...], dwell: int
+) -> tuple[float, ...]:
+    """Dwell of each edge of the cycle over the machine's own dwell, 1 where that is 0."""
+    return tuple(
+        edges[number].guard.dwell / dwell if dwell else 1.0 for number in cycle(states, edges)
+    )
+
+
+def stride(shares_: tuple[float, ...], dwell: int) -> int:
+    """Least control steps of a cycle at this dwell: each edge waits for its share, rounded up."""
+    return sum(max(1, ceil(share * dwell - 1e-9)) for share in shares_)
+
+
+def mirrored_states(
+    states: tuple[State, ...], edges: tuple[Transition, ...]
+) -> tuple[int, ...] | None:
+    """State u in the mirror is state `result[u]`; None where the mirror shows another machine.
+
+    Of a checked machine: every state is reached from the first and guards exclude each other, so
+    the image of the first state settles those of all others.
+    """
+    names = [state.name for state in states]
+    for image_of_first in names:
+        images = _images(states[0].name, image_of_first, edges)
+        if images is not None and _is_mirror(images, states, edges):
+            return tuple(names.index(images[name]) for name in names)
+    return None
+
+
+def _images(
+    first: str, image_of_first: str, edges: tuple[Transition, ...]
+) -> dict[str, str] | None:
+    """Follow every edge and its mirror image side by side; None where there is no such edge."""
+    targets = {(edge.source, edge.guard): edge.target for edge in edges}
+    images, waiting = {first: image_of_first}, [first]
+    while waiting:
+        name = waiting.pop()
+        for edge in (edge for edge in edges if edge.source == name):
+            target = targets.get((images[name], edge.guard.mirrored()))
+            if target is None:
+                return None
+            if edge.target not in images:
+                images[edge.target] = target
+                waiting.append(edge.target)
+    return images
+
+
+def _is_mirror(
+    images: dict[str, str], states: tuple[State, ...], edges: tuple[Transition, ...]
+) -> bool:
+    carried = {
+        replace(edge.mirrored(), source=images[edge.source], target=images[edge.target])
+        for edge in edges
+    }
+    stances = {state.name: state.stance for state in states}
+    return carried == set(edges) and all(
+        state.mirrored().stance == stances[images[state.name]] for state in states
+    )
