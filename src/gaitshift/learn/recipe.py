@@ -254,6 +254,17 @@ class Recipe:
         return last.averaged > 0 and iteration >= self.iterations - last.averaged * last.iterations
 
     @classmethod
+    def two_stage(cls) -> "Recipe":
+        """The recipe before the last stage was added: six of the shipped policies are by it.
+
+        The last 35 % of all iterations settle, and actors are averaged over the last 24 %.
+        """
+        rough, total = replace(_ROUGH, trace_factor=1.0), 350 + _ROUGH.iterations
+        settle, averaged = (share * total / _ROUGH.iterations for share in (0.35, 0.24))
+        last = replace(rough, settle=settle, averaged=averaged)
+        return cls(stages=(Stage(name="flat", iterations=350), last))
+
+    @classmethod
     def paper(cls) -> "Recipe":
         """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
 
@@ -290,5 +301,5 @@ def _grown(iteration: int, start: float, end: float) -> float:
     return min(max((iteration - start) / (end - start), 0.0), 1.0)
 
 
-PRESETS = {"default": Recipe, "paper": Recipe.paper}
+PRESETS = {"default": Recipe, "two-stage": Recipe.two_stage, "paper": Recipe.paper}
 """Recipes by the name that `gaitshift train --preset` takes."""

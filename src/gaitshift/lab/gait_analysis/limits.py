@@ -35,7 +35,7 @@ FIRST = Limits(
     duty_asymmetry=0.05,
     clearance=0.05,
 )
-"""Of `FIRST_GAITS`."""
+"""Of the paper's three gaits."""
 
 OTHERS = Limits(
     survival=0.99,
@@ -49,10 +49,10 @@ OTHERS = Limits(
 )
 """Of every other gait."""
 
-FIRST_GAITS = ("trot", "pace", "bound")
-"""The paper's."""
+LIMITS = dict.fromkeys(("trot", "pace", "bound"), FIRST)
+"""Gaits with limits of their own class."""
 
 
 def limits_of(gait: str) -> Limits:
     """The limits of a gait, by its name."""
-    return FIRST if gait in FIRST_GAITS else OTHERS
+    return LIMITS.get(gait, OTHERS)
