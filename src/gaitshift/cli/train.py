@@ -32,8 +32,8 @@ class Train:
     gait: Annotated[str | None, tyro.conf.Positional] = None
     """Name of a gait (see `gaitshift gaits`) or a machine file (.toml)."""
     preset: Literal["default", "two-stage", "paper"] = "default"
-    """Training recipe: ours; two-stage, ours before it had a third stage; or the paper's (Table I, 30
-    robots, Kp 3, Kd 0.2, flat ground)."""
+    """Training recipe: ours; two-stage, ours before it had a third stage; or the paper's (Table I,
+    30 robots, Kp 3, Kd 0.2, flat ground)."""
     robot_file: Path | None = None
     """Robot file (.toml, beside its MJCF file); ANYmal B by default."""
     robots: int | None = None

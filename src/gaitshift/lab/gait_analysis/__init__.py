@@ -1,5 +1,6 @@
 """What a log says about a gait: its figures, its name, and whether it is clean."""
 
+from gaitshift.lab.gait_analysis.limits import FIRST_GAITS as FIRST_GAITS
 from gaitshift.lab.gait_analysis.limits import Limits as Limits
 from gaitshift.lab.gait_analysis.limits import limits_of as limits_of
 from gaitshift.lab.gait_analysis.measure import measure as measure

@@ -49,7 +49,10 @@ OTHERS = Limits(
 )
 """Of every other gait."""
 
-LIMITS = dict.fromkeys(("trot", "pace", "bound"), FIRST)
+FIRST_GAITS = ("trot", "pace", "bound")
+"""The paper's."""
+
+LIMITS = dict.fromkeys(FIRST_GAITS, FIRST)
 """Gaits with limits of their own class."""
 
 
