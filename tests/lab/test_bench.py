@@ -115,7 +115,8 @@ def test_the_baseline_is_asked_for_as_much_as_ours_after_as_many_steps(tmp_path)
     asked = []
     for _ in range(3):
         baseline.advance()
-        asked.append((baseline._env.strictness, baseline._env.command_scale))
+        now = baseline._env.curriculum
+        asked.append((now.strictness, now.command_scale))
     assert asked == [(0.0, 0.0), (0.0, 0.0), (0.5, 0.25)]
 
 
