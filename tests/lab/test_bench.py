@@ -223,7 +223,7 @@ def test_only_training_is_timed_up_to_the_first_passed_check_or_the_limit(
 def test_of_robots_that_all_fall_at_once_the_line_and_the_table_say_what_there_is(tmp_path):
     """Folded legs bring every body to the ground within the warm-up: no speed, no pattern."""
     env = GaitEnv(TROT, flat(20.0, 20.0), 2, config=SMALL.env, threads=1)
-    layer = torch.nn.Linear(env.observe.size, 12)
+    layer = torch.nn.Linear(env.walker.observation.size, 12)
     with torch.no_grad():
         layer.weight.zero_()
         layer.bias.copy_(torch.from_numpy(FOLD))
