@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
-from hopping import (
-    FLAT,
-    HOP,
-    arbitrary_actions,
-    commanded,
-    feed,
-    ranged,
-)
+from hopping import FLAT, HOP, arbitrary_actions, commanded, feed, ranged
 
 
 def draws(env, resets=30):

@@ -5,11 +5,7 @@ import pytest
 
 from gaitshift.gait import gaits
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
-from hopping import (
-    FLAT,
-    arbitrary_actions,
-    keep_steps,
-)
+from hopping import FLAT, arbitrary_actions, keep_steps
 
 TROT_STANCES = ((True, False, False, True), (False, True, True, False))
 """FL FR BL BR, of the trot's states in their order."""

@@ -3,10 +3,7 @@
 import gymnasium as gym
 import numpy as np
 
-from hopping import (
-    FOLD,
-    arbitrary_actions,
-)
+from hopping import FOLD, arbitrary_actions
 
 
 def test_one_robot_as_a_plain_environment_goes_the_way_of_a_vector_of_one():
