@@ -32,7 +32,7 @@ from gaitshift.learn.learner import DivergedError
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import Run
 from gaitshift.show.plots.learning import Landmarks, comparison_curves, reward_curves
-from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.table import write
 from waiting import PATIENCE, wait_until
@@ -118,8 +118,8 @@ def test_a_plan_is_all_settings_gaits_and_seeds_and_parts_can_be_picked():
 def test_the_factor_on_penalties_grows_in_a_straight_line():
     recipe = replace(Recipe.paper(), penalty_start=0.2, penalty_until=100)
     table = {0: 0.2, 25: 0.4, 50: 0.6, 100: 1.0, 101: 1.0, 499: 1.0}
-    assert {i: round(recipe.penalty_scale(i), 9) for i in table} == table
-    assert {Recipe.paper().penalty_scale(i) for i in table} == {1.0}
+    assert {i: round(recipe.curriculum(i).penalty_scale, 9) for i in table} == table
+    assert {Recipe.paper().curriculum(i).penalty_scale for i in table} == {1.0}
 
 
 @pytest.mark.parametrize("start", [-0.1, 1.1])
@@ -133,7 +133,7 @@ def test_the_factor_is_on_the_penalties_and_on_nothing_else():
         config = EnvConfig(command_share=0.0)
         env = GaitEnv(gaits.load("trot"), flat(4.0, 4.0), 5, config=config, threads=1)
         env.reset(seed=3)
-        env.penalty_scale = scale
+        env.curriculum = Curriculum(penalty_scale=scale)
         return env.step(np.random.default_rng(0).normal(size=(5, 12)))[4]["reward_terms"]
 
     whole, quarter = terms(1.0), terms(0.25)

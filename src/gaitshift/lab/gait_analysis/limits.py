@@ -1,5 +1,6 @@
 """What a gait has to reach to be called clean."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -52,7 +53,7 @@ OTHERS = Limits(
 FIRST_GAITS = ("trot", "pace", "bound")
 """The paper's."""
 
-LIMITS = dict.fromkeys(FIRST_GAITS, FIRST)
+LIMITS: Mapping[str, Limits] = dict.fromkeys(FIRST_GAITS, FIRST)
 """Gaits with limits of their own class."""
 
 
