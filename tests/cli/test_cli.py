@@ -200,7 +200,7 @@ def test_json_is_one_object_and_nothing_else_on_stdout(
     figures = json.loads(capsys.readouterr().out)
     assert figures["gait"] == "trot"
     assert figures["survival"] == 1.0
-    assert Log.load(log).qpos.shape == (50, 4, 19)
+    assert Log.load(log).sensed.joint_position.shape == (50, 4, 12)
 
 
 def test_gaits_are_listed_drawn_and_printed_as_mermaid(
@@ -253,7 +253,7 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
 INTERRUPTED = """
 import os, signal, sys
 from gaitshift.cli import main
-from gaitshift.training.run import Run
+from gaitshift.learn.run import Run
 iterate = Run.iterate
 def interrupted(self):
     row = iterate(self)

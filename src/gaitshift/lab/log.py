@@ -122,7 +122,11 @@ class Log(Batch):
         values["gaits"] = tuple(str(name) for name in np.atleast_1d(values["gaits"]))
         plain = {"sensed.has_heading": bool, "sensed.period": float}
         for name, kind in plain.items():
-            values[name] = kind(values[name])
+            if np.size(values[name]) != 1:
+                raise GaitshiftError(
+                    f"{path}: '{name}' must be one value, got the shape {np.shape(values[name])}"
+                )
+            values[name] = kind(np.ravel(values[name])[0])
         values = checked(path, values, {name: types[name] for name in values})
         records = {name: _record(name, made, values) for name, made in _RECORDS.items()}
         own = {name: value for name, value in values.items() if "." not in name}
@@ -153,7 +157,7 @@ def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
             entries = np.load(file)
             if not isinstance(entries, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
-            given: Any = entries["format_version"] if "format_version" in entries else None
+            given: Any = entries.get("format_version")
             version = None if given is None else int(given)
             if version is None and "qpos" in entries:
                 raise GaitshiftError(
