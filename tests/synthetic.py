@@ -81,7 +81,7 @@ def log_of(contact, *, gaits=("trot",), terrain=None, **changes):
     )
     truth = Privileged(
         base_position_w=np.tile([0.0, 0.0, 0.45], (*shape, 1)),
-        base_quaternion_w=standing,
+        base_quaternion_w=standing.copy(),
         velocity_b=np.zeros((*shape, 3)),
         foot_position_w=np.zeros((*shape, 4, 3)),
         foot_velocity_w=np.zeros((*shape, 4, 3)),

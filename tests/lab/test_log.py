@@ -193,7 +193,7 @@ def test_what_a_robot_need_not_have_may_be_missing(tmp_path):
         ),
         (
             instead("sensed.contact", np.ones((STEPS, ROBOTS, 3), dtype=bool)),
-            "'sensed.contact' must have the shape (50, 3, 4), got (50, 3, 3)",
+            "'sensed.contact' must have the shape (T, N, 4), got (50, 3, 3)",
         ),
         (
             instead("sensed.joint_torque", np.zeros((STEPS, 2, 12))),
