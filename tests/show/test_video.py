@@ -332,7 +332,7 @@ else:
 )
 def test_without_opengl_one_line_says_what_to_install(environment):
     said = in_a_fresh_interpreter(**environment)
-    assert said.startswith("unavailable: no OpenGL to draw videos with (")
+    assert said.startswith("unavailable: videos need OpenGL (")
     assert said.endswith("apt-get install libegl1 libgl1")
     assert "\n" not in said
 

@@ -30,6 +30,8 @@ BESIDE_THE_PANEL = 2 / 3
         (["nowhere.npz"], "no log file nowhere.npz"),
         (["--robots", "40"], "1 to 16"),
         (["--condition", "guess"], "unknown graph 'guess'"),
+        (["--condition", "oracle"], "got 'oracle', which needs the truth about the ground"),
+        (["--condition", "speed"], "a graph of two gaits, there and back, is needed"),
         (["--port", "70000"], "1 to 65535"),
         (["--track", "moon@3"], "moon"),
         (["--host", "203.0.113.7"], "cannot listen on 203.0.113.7:8080"),

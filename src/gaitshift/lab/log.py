@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -157,7 +157,7 @@ def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
             entries = np.load(file)
             if not isinstance(entries, np.lib.npyio.NpzFile):
                 raise ValueError("it holds a single array")
-            given: Any = entries.get("format_version")
+            given = cast(Any, entries).get("format_version")
             version = None if given is None else int(given)
             if version is None and "qpos" in entries:
                 raise GaitshiftError(

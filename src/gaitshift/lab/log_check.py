@@ -37,7 +37,7 @@ def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) 
         GaitshiftError: an array of another shape or kind, numbers that are not finite, a time that
             does not rise at one rate.
     """
-    whole = {**values, **_shaped(path, values, declared)}
+    whole: dict[str, Any] = {**values, **_shaped(path, values, declared)}
     _check_numbers(path, whole)
     _check_time(path, whole["sensed.time"], whole["sensed.period"])
     return whole
