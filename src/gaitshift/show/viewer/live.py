@@ -195,8 +195,8 @@ class LiveRun:
             raise GaitshiftError(f"gait must be one with a policy, got '{min(missing)}'")
         if any(isinstance(one, Oracle) for one in graph.statistics.values()):
             raise GaitshiftError(
-                f"condition must be one that robots can sense, got '{config.condition}', which needs "
-                "the truth about the ground"
+                f"condition must be one that robots can sense, got '{config.condition}', which "
+                "needs the truth about the ground"
             )
         return Autonomous(graph, config.robots) if config.is_autonomous else None
 
