@@ -87,7 +87,7 @@ def test_the_way_is_that_of_leg_odometry(tmp_path):
 
 
 def test_a_stretch_that_is_too_long_is_cut(tmp_path, monkeypatch):
-    monkeypatch.setattr(table, "LONGEST", 15)
+    monkeypatch.setattr(log_files, "LONGEST", 15)
     lengths = [len(one.time) for one in passages(written(tmp_path, columns()))]
     assert lengths == [15, 15, 10, 15, 5]
 
