@@ -41,7 +41,7 @@ def test_a_kept_log_of_other_size_is_refused_before_anything_is_recorded(
     logs = shutil.copytree(recorded, tmp_path / "logs")
     line = refused(capsys, ask(logs, robots, seconds, courses=("up-10", "flat")))
     assert f"{logs / 'trot-flat-0.npz'} has 2 robots × 0.3 s" in line
-    assert f"not {robots} × {seconds:g} s" in line
+    assert f"got {robots} × {seconds:g} s" in line
     assert "--overwrite" in line
     assert [path.name for path in logs.iterdir()] == ["trot-flat-0.npz"]
     main([*ask(logs, robots, seconds), "--overwrite"])
