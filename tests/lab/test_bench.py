@@ -1,7 +1,6 @@
 """Time to gait: the check, the clock, the medians, the command."""
 
 import json
-import sys
 from dataclasses import replace
 
 import pytest
@@ -13,7 +12,6 @@ from gaitshift.cli.bench import _text
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.benchmark import replay
 from gaitshift.lab.benchmark import time_to_gait as race
 from gaitshift.lab.benchmark.baseline import ROBOTS, Baseline, GaitVecEnv
 from gaitshift.lab.benchmark.outcome import (
@@ -419,90 +417,9 @@ def test_the_quick_measurement_runs_from_the_command_to_the_figure(capsys, tmp_p
     assert baseline[1] == "stable-baselines3"
 
 
-def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):
-    table = tmp_path / "time_to_gait.csv"
-    write_table(table, [row_of(outcome())], COLUMNS)
-    table.write_text(table.read_text().replace("True", "yes"))
-    line = refusal(capsys, "time-to-gait", "--quick", "--out", str(tmp_path))
-    assert str(table) in line
-    assert "must be True or False, got 'yes'" in line
-
-
 def test_ours_alone_is_measured_and_a_check_that_asks_for_nothing_is_passed_at_once():
     anything = Criterion(survival=0.0, speed_error=9.0, pattern_fraction=0.0, robots=2, seconds=2.2)
     config = replace(TimeToGait.quick(), baseline_budget=0.0, check=anything)
     (found,) = time_to_gait(config)
     assert found.reached
     assert found.steps == 8 * Recipe().steps
-
-
-def refusal(capsys, *arguments):
-    """The one line with which the command refuses."""
-    with pytest.raises(SystemExit) as exit_:
-        main(["bench", *arguments])
-    said = capsys.readouterr()
-    assert (exit_.value.code, said.out) == (2, "")
-    (line,) = said.err.strip().splitlines()
-    return line
-
-
-def test_without_the_baselines_library_one_line_says_so(capsys, monkeypatch):
-    for module in ("baseline", "vec_env"):
-        monkeypatch.delitem(sys.modules, f"gaitshift.lab.benchmark.{module}", raising=False)
-    for module in [name for name in sys.modules if name.startswith("stable_baselines3")]:
-        monkeypatch.setitem(sys.modules, module, None)
-    line = refusal(capsys, "time-to-gait", "--quick")
-    assert "stable_baselines3" in line
-    assert "--baseline-budget" in line
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["time-to-gait", "--seeds", "0"], "seeds must be 1 to 100, got 0"),
-        (["time-to-gait", "--first-seed", "-1"], "first_seed must be 0 or larger, got -1"),
-        (["time-to-gait", "--gaits", "trott"], "trott"),
-        (["time-to-gait", "--gaits"], "gaits must name at least one gait"),
-        (
-            ["time-to-gait", "--baseline-budget", "-1"],
-            "baseline_budget must be 0 to 86400 s, got -1.0",
-        ),
-        (["time-to-walk"], "time-to-gait"),
-        (["--seed", "-1"], "seed must be 0 or larger, got -1"),
-    ],
-)
-def test_what_cannot_be_measured_is_refused(arguments, says, capsys):
-    assert says in refusal(capsys, *arguments)
-
-
-def test_an_output_folder_with_other_content_is_left_alone(capsys, tmp_path):
-    (tmp_path / "thesis.tex").write_text("years of work")
-    line = refusal(capsys, "time-to-gait", "--quick", "--out", str(tmp_path))
-    assert "--overwrite" in line
-    assert [file.name for file in tmp_path.iterdir()] == ["thesis.tex"]
-
-
-def test_the_plain_bench_measures_the_speed_and_does_without_torch(capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "torch", None)
-    main(["bench", "--robots", "3", "--steps", "2", "--json"])
-    said = capsys.readouterr()
-    figures = json.loads(said.out)
-    assert set(figures) == {"bare_steps_per_s", "env_steps_per_s", "env_over_bare"}
-    assert figures["bare_steps_per_s"] > figures["env_steps_per_s"] > 0
-    assert "'torch' is missing" in said.err
-
-
-def test_the_help_tells_the_measurements_apart(capsys):
-    with pytest.raises(SystemExit):
-        main(["bench", "--help"])
-    told = capsys.readouterr().out
-    words = ("{speed,time-to-gait,page,replay}", "--baseline-budget", "--robots", "--page-seconds")
-    assert all(word in told for word in words)
-
-
-def test_the_replay_is_measured_with_and_without_a_leak(capsys, monkeypatch):
-    monkeypatch.setattr(replay, "EPISODES", 3)
-    main(["bench", "replay", "--json"])
-    found = json.loads(capsys.readouterr().out)
-    assert list(found) == ["no_leak_s", "leak_s"]
-    assert all(0.0 < seconds < 60.0 for seconds in found.values())

@@ -57,7 +57,7 @@ def test_a_log_that_ended_as_all_robots_had_fallen_is_kept(recorded, tmp_path, c
     replace(log, fallen=fallen).save(path)
     before = path.read_bytes()
     main(ask(path.parent, 2, 8))
-    assert "not recorded again" in capsys.readouterr().err
+    assert "exists, not repeated" in capsys.readouterr().err
     assert path.read_bytes() == before
 
 
