@@ -25,6 +25,7 @@ from gaitshift.lab.evaluation import (
 from gaitshift.lab.evaluation.trials import Row
 from gaitshift.lab.log import Log
 from gaitshift.robot.robot_file import use_robot_file
+from gaitshift.sim.terrain import spec_help
 
 Judged = tuple[dict[str, Any], Log]
 """Figures, and the log that they are of."""
@@ -52,6 +53,9 @@ class Evaluate(EvaluationConfig):
     Figures leave out the first 2 s and robots after their fall.
     """
 
+    terrain: Annotated[str, tyro.conf.arg(help=f"Spec of the ground:\n{spec_help()}\n")] = (
+        EvaluationConfig.terrain
+    )
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
     controller: Literal["policy", "cpg"] = "policy"

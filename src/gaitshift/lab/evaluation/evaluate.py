@@ -38,8 +38,7 @@ class EvaluationConfig:
     """What a policy is put through."""
 
     terrain: str = "flat"
-    """Spec of the ground: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a
-    track."""
+    """Spec of the ground: one piece, or a track of them (`sim.terrain.spec_help`)."""
     episodes: int = 256
     """Robots, each running one episode, all at once."""
     seconds: float = 10.0
