@@ -280,7 +280,10 @@ def test_a_video_is_written_whole_or_not_at_all(tmp_path):
         (lambda folder: render(slide(), folder / "a.mp4", t0=5.0), "nothing to show from 5"),
         (lambda folder: render(slide(), folder / "a.mp4", width=321), "even numbers"),
         (lambda folder: render(slide(), folder / "a.mp4", fps=0), "1 to 120"),
-        (lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"), "of a 'dog'"),
+        (
+            lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"),
+            "of the robot 'dog'",
+        ),
         (lambda folder: render(elsewhere(), folder / "a.mp4"), "a ground of its own"),
         (lambda folder: contact_sheet(folder / "no.mp4", folder / "a.png"), "no video"),
         (lambda folder: contact_sheet([], folder / "a.png"), "no pictures"),

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
+from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy as policies
 from gaitshift.control.cpg import CpgController
 from gaitshift.errors import GaitshiftError
@@ -24,7 +25,6 @@ from gaitshift.lab.evaluation import (
 )
 from gaitshift.lab.evaluation.trials import Row
 from gaitshift.lab.log import Log
-from gaitshift.robot.robot_file import use_robot_file
 from gaitshift.sim.terrain import spec_help
 
 Judged = tuple[dict[str, Any], Log]
@@ -47,7 +47,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(EvaluationConfig):
+class Evaluate(RobotOption, EvaluationConfig):
     """Judge a policy: many robots at once, without exploration noise.
 
     Figures leave out the first 2 s and robots after their fall.
@@ -61,8 +61,6 @@ class Evaluate(EvaluationConfig):
     controller: Literal["policy", "cpg"] = "policy"
     """What walks: the policy, or, in the gait of this name, coupled oscillators that learned
     nothing: a baseline (trot, pace, bound, walk)."""
-    robot_file: Path | None = None
-    """The robot of the policy, if it is not ANYmal B, as it was given to `train`."""
     trials: Literal["all", "short", "quick"] | None = None
     """Run the standard trials instead, each figure against its limit: all (1000 pushed episodes,
     then 256 of 20 s on each ground), short (a quarter of each), or quick ones for a first look."""
@@ -88,8 +86,7 @@ class Evaluate(EvaluationConfig):
             figures, log = self._evaluate(partial(evaluate_controller, walker), told)
             self._write(figures, log, gaits.load(self.policy))
             return
-        use_robot_file(self.robot_file)
-        loaded = policies.load(self.policy)
+        loaded = policies.load(self.policy, self.read_robot())
         self._make_folder()
         if self.commands:
             self._command(loaded)

@@ -9,6 +9,7 @@ import numpy as np
 import tyro
 
 from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy as policies
 from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
@@ -18,7 +19,7 @@ from gaitshift.lab.log import Log
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class Record(RobotOption):
     """Record gaits on the standard courses: flat, slopes, steps, stairs, pebbles, noise.
 
     Writes OUT/GAIT-COURSE-SEED.npz, a log a gait and course, some 30 MB each. A log that is there
@@ -47,7 +48,8 @@ class Record:
         if not self.policies:
             raise GaitshiftError(f"which gaits? give some of {', '.join(policies.shipped())}")
         _ = EvaluationConfig(episodes=self.robots, seconds=self.seconds, seed=self.seed)
-        loaded = [policies.load(name) for name in self.policies]
+        robot = self.read_robot()
+        loaded = [policies.load(name, robot) for name in self.policies]
         chosen = select(self.courses)
         if self.out.exists() and not self.out.is_dir():
             raise GaitshiftError(f"{self.out} is a file; give a folder with --out")

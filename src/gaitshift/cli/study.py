@@ -8,7 +8,7 @@ from typing import Any
 
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
-from gaitshift.control import policy as policies
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.table import write_rows
 from gaitshift.shift import CONDITIONS
@@ -17,7 +17,7 @@ TABLE = "crossings.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class Study(RobotOptions):
     """Send robots over noise in one gait, in the other, and shifted by each condition.
 
     Tells survival, distance, speed and cost of transport with intervals, beside an oracle that sees
@@ -58,7 +58,7 @@ class Study:
             if not 0 <= amplitude <= 1:
                 raise GaitshiftError(f"an amplitude of {amplitude:g} m: 0 to 1 m would be right")
         every = ways(self.flat_gait, self.rough_gait, self.conditions)
-        loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
+        loaded = self.load_policies((self.flat_gait, self.rough_gait))
         path = self.out / TABLE
         rows = kept_rows(
             path,

@@ -12,17 +12,18 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from gaitshift.cli.output import emit_json, say
+from gaitshift.cli.robot_options import RobotOption
+from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import glance
-from gaitshift.robot.robot_file import use_robot_file
 
 if TYPE_CHECKING:
     from gaitshift.learn.run import Row, Run
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train:
+class Train(RobotOption):
     """Train a gait with PPO: flat ground first, then rough ground with pushes.
 
     The folder gets config.json, progress.csv, verdicts.csv (a short look at the policy at each
@@ -34,8 +35,6 @@ class Train:
     """A gait by its name (see `gaitshift gaits`), or a machine file ending in .toml."""
     preset: Literal["default", "paper"] = "default"
     """Recipe: ours, or the paper's (Table I alone, 30 robots, Kp 3, Kd 0.2, flat ground)."""
-    robot_file: Path | None = None
-    """Another robot than ANYmal B, as a .toml file beside its MJCF."""
     robots: int | None = None
     """Robots in parallel; the recipe's by default."""
     iterations: int | None = None
@@ -88,7 +87,7 @@ class Train:
             raise GaitshiftError(f"which gait? give one of {known}, a .toml file, or --resume DIR")
         if self.seed < 0:
             raise GaitshiftError(f"seed {self.seed}: a seed is 0 or larger")
-        machine, robot = gaits.load(self.gait), use_robot_file(self.robot_file)
+        machine, robot = gaits.load(self.gait), self.read_robot()
         recipe = PRESETS[self.preset]()
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)
@@ -150,7 +149,7 @@ class _Bar:
 
     def judge(self, path: Path) -> "Row":
         """A short look at the policy as it stands."""
-        self.verdict = glance(path)
+        self.verdict = glance(policy.load(path, self._run.robot))
         return self.verdict
 
     def __call__(self, row: "Row") -> None:

@@ -11,7 +11,7 @@ import tyro
 
 from gaitshift.cli.growing import README, check_numbers, kept_rows
 from gaitshift.cli.output import emit_json, emit_table, progress, say
-from gaitshift.control import policy as policies
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.table import write_rows
 from gaitshift.sim.terrain import from_spec
@@ -20,7 +20,7 @@ TABLE, PAGE = "transitions.csv", "page.html"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Transitions:
+class Transitions(RobotOptions):
     """Swap gaits in an instant: every ordered pair, at every phase of the stride.
 
     A shift succeeds when the robot does not fall within 5 s and shows the new gait. Writes
@@ -30,7 +30,7 @@ class Transitions:
     """
 
     gaits: Annotated[tuple[str, ...], tyro.conf.Positional] = ("trot", "pace", "bound")
-    """Gaits by name; `all` for every shipped one."""
+    """Gaits by name; `all` for every one with a policy."""
     grounds: tuple[str, ...] = ("flat", "perlin:0.10")
     """Grounds, as in `evaluate --terrain`."""
     switches: int = 512
@@ -54,11 +54,11 @@ class Transitions:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        names = policies.shipped() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
+        names = self.known_gaits() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
         if len(names) < 2:
             raise GaitshiftError("a shift needs two gaits or more")
         check_numbers("switches", self.switches, self.seed)
-        loaded = {name: policies.load(name) for name in names}
+        loaded = self.load_policies(names)
         for ground in self.grounds:
             from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # a fault is told at once
         path = self.out / TABLE

@@ -14,7 +14,7 @@ from gaitshift.control.policy_info import PolicyInfo, read_info
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ROBOTS, Robot
+from gaitshift.robot.description import ANYMAL_B, Robot
 
 _SHIPPED = Path(__file__).parent / "policies"
 
@@ -30,11 +30,8 @@ class Policy:
     info: PolicyInfo
     machine: RewardMachine
     session: onnxruntime.InferenceSession
-
-    @property
-    def robot(self) -> Robot:
-        """The robot it drives."""
-        return ROBOTS[self.info.robot]
+    robot: Robot
+    """The robot that it drives."""
 
     @property
     def gait(self) -> str:
@@ -79,12 +76,12 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _SHIPPED.glob("*.onnx")))
 
 
-def load(name_or_path: str | Path) -> Policy:
-    """A shipped policy by the name of its gait, or any policy file.
+def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
+    """A shipped policy by the name of its gait, or any policy file, for this robot.
 
     Raises:
         GaitshiftError: no such policy; not a whole ONNX file; not one of gaitshift's; of another
-            format version or robot; or its parts contradict each other.
+            format version or of another robot; or its parts contradict each other.
     """
     path = Path(name_or_path)
     if path.suffix != ".onnx":
@@ -98,7 +95,7 @@ def load(name_or_path: str | Path) -> Policy:
     session = _open(path)
     info = read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
     try:
-        policy = Policy(path, info, RewardMachine.from_dict(info.machine), session)
+        policy = Policy(path, info, RewardMachine.from_dict(info.machine), session, robot)
         _check(policy)
     except GaitshiftError as error:
         raise GaitshiftError(f"{path}: {error}") from error
@@ -118,7 +115,7 @@ def _open(path: Path) -> onnxruntime.InferenceSession:
 
 
 def _check(policy: Policy) -> None:
-    """Refuses a policy whose robot is unknown or whose parts contradict each other."""
+    """Refuses a policy of another robot, or whose parts contradict each other."""
     info = policy.info
     session: Any = policy.session
     inputs, outputs = (
@@ -134,11 +131,7 @@ def _check(policy: Policy) -> None:
         raise GaitshiftError(
             f"its network gives {outputs['action'][1]} actions; 12, one a joint, would be right"
         )
-    if info.robot not in ROBOTS:
-        raise GaitshiftError(
-            f"it is for the robot '{info.robot}'; known: {', '.join(ROBOTS)}; any other one needs "
-            "its file (--robot-file)"
-        )
+    policy.robot.check_is(info.robot, "it")
     if info.control_rate != 1.0 / CONTROL_PERIOD:
         raise GaitshiftError(
             f"it acts {info.control_rate:g} times a second; {1.0 / CONTROL_PERIOD:g} would be right"

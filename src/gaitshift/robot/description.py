@@ -42,6 +42,8 @@ class Robot:
     """Joint angles of the default stance, the paper's q_init (12 values) [rad]."""
     stance_height: float
     """Height of the base origin above level ground in that stance, feet just touching [m]."""
+    mass: float
+    """Of all its bodies [kg]."""
     foot_radius: float
     """[m]"""
     effort_limit: float
@@ -58,6 +60,14 @@ class Robot:
             raise GaitshiftError(f"robot {self.name}: a stance has 12 joint angles")
         if "default" not in self.gains:
             raise GaitshiftError(f"robot {self.name}: gains need a preset named 'default'")
+
+    def check_is(self, name: str, what: str) -> None:
+        """`GaitshiftError` unless `what`, which is of the robot of this name, is of this one."""
+        if name != self.name:
+            given = "no" if name == ANYMAL_B.name else "its file as"
+            raise GaitshiftError(
+                f"{what} is of the robot '{name}', not of '{self.name}'; give {given} --robot-file"
+            )
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -103,6 +113,7 @@ ANYMAL_B = Robot(
         *(-_HAA, -_HFE, _KFE),
     ),
     stance_height=0.4927,
+    mass=30.475396462000006,
     foot_radius=0.031,
     effort_limit=80.0,
     velocity_limit=15.0,
@@ -113,6 +124,3 @@ ANYMAL_B = Robot(
         "paper": Gains(kp=3.0, kd=0.2),
     },
 )
-
-ROBOTS = {ANYMAL_B.name: ANYMAL_B}
-"""The robots that policies may name."""

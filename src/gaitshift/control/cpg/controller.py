@@ -31,7 +31,7 @@ class CpgConfig:
     """A swinging foot takes this long to get there [s]."""
     levelling: float = 0.3
     """Share of roll and pitch that standing legs push against."""
-    mass: float = 30.48
+    mass: float = ANYMAL_B.mass
     """Of the robot [kg]; standing legs are given the torques that bear it."""
     loading: float = 0.15
     """Share of a stance over which a leg takes its load on, and at its end off."""

@@ -13,7 +13,7 @@ from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import measure, robot_mass
+from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.sim.terrain import Terrain, from_spec
@@ -76,7 +76,7 @@ def evaluate(
 ) -> tuple[dict[str, Any], Log]:
     """Runs the deterministic policy and measures it (`gait_analysis.measure`)."""
     log = run_policy(policy, config, report=report)
-    return measure(log, {policy.gait: policy.machine}, mass=robot_mass(policy.robot.name)), log
+    return measure(log, {policy.gait: policy.machine}, policy.robot), log
 
 
 def evaluate_controller(
@@ -91,7 +91,7 @@ def evaluate_controller(
     """
     log = run_controller(controller, config, report=report)
     machines = {name: gaits.load(name) for name in controller.gaits}
-    return measure(log, machines, mass=robot_mass(controller.robot.name)), log
+    return measure(log, machines, controller.robot), log
 
 
 def run_policy(

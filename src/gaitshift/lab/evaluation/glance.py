@@ -1,9 +1,8 @@
 """A short look at a policy: its verdict in one line, as a training writes it down on its way."""
 
-from pathlib import Path
 from typing import Any
 
-from gaitshift.control import policy
+from gaitshift.control.policy import Policy
 from gaitshift.lab.evaluation.evaluate import EvaluationConfig, evaluate
 
 ROBOTS, SECONDS = 16, 5.0
@@ -12,14 +11,14 @@ ROBOTS, SECONDS = 16, 5.0
 FIGURES = ("survival", "speed_mean", "pattern_fraction", "cycles_per_s", "cost_of_transport")
 
 
-def glance(path: Path) -> dict[str, Any]:
-    """The verdict on a policy file on flat ground, at its own speed and stride frequency.
+def glance(policy: Policy) -> dict[str, Any]:
+    """The verdict on a policy on flat ground, at its own speed and stride frequency.
 
     `gait` is the name by the contacts alone, `clean` whether it is the right one with all limits
     kept, `misses` the figures that miss theirs with the worst foot, parted by "; ". The others are
     as `gait_analysis.measure` defines them.
     """
-    figures, _ = evaluate(policy.load(path), EvaluationConfig(episodes=ROBOTS, seconds=SECONDS))
+    figures, _ = evaluate(policy, EvaluationConfig(episodes=ROBOTS, seconds=SECONDS))
     verdict = figures["verdict"]
     return {
         "gait": verdict["gait"],
