@@ -17,7 +17,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait.gaits import load
 from gaitshift.lab.evaluation.evaluate import grounds_of
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import measure, robot_mass
+from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.legs import LEGS
@@ -111,7 +111,7 @@ def walked(name, ground, seconds=8.0, n=8):
 
 @pytest.mark.parametrize("name", GAITS)
 def test_each_gait_walks_at_its_speed_and_is_named_by_its_contacts(name):
-    figures = measure(walked(name, "flat"), {name: load(name)}, mass=robot_mass("anymal_b"))
+    figures = measure(walked(name, "flat"), {name: load(name)}, ANYMAL_B)
     assert figures["survival"] == 1.0
     assert figures["verdict"]["gait"] == name
     assert figures["speed_mean"] == pytest.approx(GAITS[name].speed, abs=0.08)

@@ -313,7 +313,7 @@ def test_another_format_version_is_refused(altered):
 
 def test_another_robot_is_refused_with_those_there_are(altered):
     line = refusal(altered(robot='"spot"'))
-    assert "robot must be one of anymal_b, got 'spot'" in line
+    assert "of the robot 'spot', not of 'anymal_b'" in line
 
 
 @pytest.mark.parametrize(("name", "text"), [("kp", "81.5"), ("kd", "0.5")])

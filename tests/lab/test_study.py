@@ -39,7 +39,7 @@ def log():
 
 
 def test_robots_on_rails_come_as_far_and_cost_as_much_as_mechanics_says(log):
-    out = measure_crossings(log, 3.0)
+    out = measure_crossings(log, 3.0, MASS)
     assert out.arrived.all()
     assert not out.fell.any()
     np.testing.assert_allclose(out.distance, 3.0)
@@ -53,7 +53,7 @@ def test_what_comes_after_the_finish_or_a_fall_does_not_count(log):
     fallen[150:, 0] = True  # at 1.5 m
     fallen[350:, 1] = True  # behind the finish
     gait[100:, :2], gait[200:, 0], gait[320:, 1] = 1, 0, 0
-    out = measure_crossings(replace(log, fallen=fallen, gait=gait), 3.0)
+    out = measure_crossings(replace(log, fallen=fallen, gait=gait), 3.0, MASS)
     assert out.fell.tolist() == [True, False, False]
     assert out.arrived.tolist() == [False, True, True]
     np.testing.assert_allclose(out.distance, [1.5, 3.0, 3.0])
@@ -61,7 +61,7 @@ def test_what_comes_after_the_finish_or_a_fall_does_not_count(log):
 
 
 def test_a_robot_that_never_arrives_is_measured_over_all_of_its_time(log):
-    out = measure_crossings(log, 100.0)
+    out = measure_crossings(log, 100.0, MASS)
     assert not out.arrived.any()
     assert not out.fell.any()
     np.testing.assert_allclose(out.distance, 4.99)
@@ -72,7 +72,7 @@ def test_a_robot_that_falls_at_once_has_no_cost_of_transport(log):
     fallen = log.fallen.copy()
     fallen[50:, 2] = True
     assert np.isnan(
-        measure_crossings(replace(log, fallen=fallen), 3.0).cost_of_transport
+        measure_crossings(replace(log, fallen=fallen), 3.0, MASS).cost_of_transport
     ).tolist() == [
         False,
         False,
@@ -90,7 +90,7 @@ def test_intervals_of_means_are_scipys():
 
 
 def test_more_shifts_than_there_and_back_are_chatter(log):
-    out = measure_crossings(log, 3.0)
+    out = measure_crossings(log, 3.0, MASS)
     four = {f.name: np.resize(getattr(out, f.name), 4) for f in fields(out)}
     way = strategies("trot", "bound", ())[0]
     row = row_of(way, 0.1, 0, Crossings(**four | {"shifts": np.array([2, 3, 0, 5])}))

@@ -32,7 +32,7 @@ def log():
 
 @pytest.fixture(scope="module")
 def data(log):
-    return run_data(log, 1)
+    return run_data(log, 1, ANYMAL_B)
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +78,7 @@ def test_bodies_arrive_as_they_are(data):
 
 def test_the_ground_on_the_page_is_the_one_that_was_walked_on(log):
     ground = from_spec(f"{TRACK},flat@8", seed=0, length=1.0, width=8.0)
-    sent = run_data(log, 0)["ground"]
+    sent = run_data(log, 0, ANYMAL_B)["ground"]
     x = sent["x"][0] + sent["x"][1] * np.arange(sent["columns"])
     y = sent["y"][0] + sent["y"][1] * np.arange(sent["rows"])
     height = unpacked(sent["height"]).reshape(len(y), len(x))

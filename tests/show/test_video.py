@@ -267,7 +267,10 @@ def test_a_video_is_written_whole_or_not_at_all(tmp_path):
             "width and height must be even",
         ),
         (lambda folder: render(slide(), folder / "a.mp4", fps=0), "1 to 120"),
-        (lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"), "got 'dog'"),
+        (
+            lambda folder: render(replace(slide(), robot="dog"), folder / "a.mp4"),
+            "of the robot 'dog'",
+        ),
         (lambda folder: render(elsewhere(), folder / "a.mp4"), "robot must be 0"),
         (lambda folder: contact_sheet(folder / "no.mp4", folder / "a.png"), "no video"),
         (lambda folder: contact_sheet([], folder / "a.png"), "at least one picture"),

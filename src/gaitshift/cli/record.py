@@ -10,6 +10,8 @@ import numpy as np
 import tyro
 
 from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.cli.robot_options import RobotOption
+from gaitshift.control import Controller
 from gaitshift.control import policy as policies
 from gaitshift.control.controllers import controller_maker
 from gaitshift.errors import GaitshiftError
@@ -21,7 +23,7 @@ from gaitshift.table import Row
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class Record(RobotOption):
     """Record gaits on the standard courses: flat, slopes, steps, stairs, pebbles, noise.
 
     Writes OUT/GAIT-COURSE-SEED.npz, one log of about 30 MB for each gait and course. Logs that
@@ -56,8 +58,7 @@ class Record:
                 "got none"
             )
         _ = EvaluationConfig(episodes=self.robots, seconds=self.seconds, seed=self.seed)
-        make = controller_maker(self.controller)
-        gaits = [make([name], 1).repertoire.gaits[0] for name in self.policies]
+        gaits = [self._controller(name, 1).repertoire.gaits[0] for name in self.policies]
         chosen = select(self.courses)
         if self.out.exists() and not self.out.is_dir():
             raise GaitshiftError(f"--out must be a folder, got the file {self.out}")
@@ -95,9 +96,12 @@ class Record:
     def _path(self, gait: str, course: Course) -> Path:
         return self.out / f"{gait}-{course.name}-{self.seed}.npz"
 
+    def _controller(self, name: str, n: int) -> Controller:
+        return controller_maker(self.controller)([name], n, robot=self.read_robot())
+
     def _record(self, name: str, gait: str, course: Course, report: Report) -> Row:
         """Records a log and writes it."""
-        controller = controller_maker(self.controller)([name], self.robots)
+        controller = self._controller(name, self.robots)
         log = run_course(controller, course, seconds=self.seconds, seed=self.seed, report=report)
         path = self._path(gait, course)
         log.save(path)

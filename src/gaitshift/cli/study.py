@@ -16,7 +16,7 @@ from gaitshift.cli.output import (
     progress,
     say,
 )
-from gaitshift.control import policy as policies
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.resume import Report, ResumableTable, run_missing
 from gaitshift.table import Row
@@ -25,7 +25,7 @@ TABLE = "crossings.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class Study(RobotOptions):
     """Compare robots on rough ground: in either gait alone, and with shifts by each condition.
 
     Reports survival, distance, speed and cost of transport with intervals, and those of an oracle
@@ -66,7 +66,7 @@ class Study:
             if not 0 <= amplitude <= 1:
                 raise GaitshiftError(f"amplitudes must be 0 to 1 m, got {amplitude:g}")
         every = strategies(self.flat_gait, self.rough_gait, self.conditions)
-        loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
+        loaded = self.load_policies((self.flat_gait, self.rough_gait))
         path = self.out / TABLE
         check_table_folder(path, overwrite=self.overwrite)
         table = ResumableTable.open(

@@ -19,7 +19,7 @@ from gaitshift.cli.output import (
     progress,
     say,
 )
-from gaitshift.control import policy as policies
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.resume import Report, ResumableTable, run_missing
 from gaitshift.sim.terrain import from_spec
@@ -29,7 +29,7 @@ TABLE, PAGE = "transitions.csv", "page.html"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Transitions:
+class Transitions(RobotOptions):
     """Test gait shifts of every ordered pair of gaits at random phases of the stride.
 
     A shift succeeds if the robot does not fall within 5 s and shows the new gait. Writes
@@ -38,7 +38,7 @@ class Transitions:
     """
 
     gaits: Annotated[tuple[str, ...], tyro.conf.Positional] = ("trot", "pace", "bound")
-    """Gaits; `all` for every shipped gait."""
+    """Gaits; `all` for every gait with a policy."""
     grounds: tuple[str, ...] = ("flat", "perlin:0.10")
     """Terrains, as in `evaluate --terrain`."""
     switches: int = 512
@@ -61,11 +61,11 @@ class Transitions:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        names = policies.shipped() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
+        names = self.known_gaits() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
         if len(names) < 2:
             raise GaitshiftError(f"gaits must name two gaits or more, got {len(names)}")
         check_numbers("switches", self.switches, self.seed)
-        loaded = {name: policies.load(name) for name in names}
+        loaded = self.load_policies(names)
         for ground in self.grounds:
             from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # a fault is told at once
         path = self.out / TABLE

@@ -8,14 +8,19 @@ from gaitshift.control.cpg import CpgController
 from gaitshift.control.driver import Driver
 from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
+from gaitshift.robot.description import Robot
 
 
 @runtime_checkable
 class ControllerMaker(Protocol):
     """Makes a controller of n robots, all in the first of the gaits."""
 
-    def __call__(self, gaits: Sequence[str], n: int) -> Controller:
-        """`gaits` are names, or whatever files the controller reads."""
+    def __call__(self, gaits: Sequence[str], n: int, *, robot: Robot | None = None) -> Controller:
+        """`gaits` are names, or files that the controller reads; `robot` is ANYmal B by default.
+
+        Raises:
+            GaitshiftError: it does not know a gait, or cannot drive this robot.
+        """
         ...
 
 

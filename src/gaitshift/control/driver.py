@@ -12,7 +12,7 @@ from gaitshift.control.policy import Policy
 from gaitshift.control.repertoire import Repertoire
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import Command
-from gaitshift.robot.description import Robot
+from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Proprioception
 
 STUCK = 2.0
@@ -60,9 +60,12 @@ class Driver:
         self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []
 
     @classmethod
-    def load(cls, gaits: Sequence[str], n: int) -> "Driver":
-        """Drives by shipped policies of these gaits, or by policy files; begins in the first."""
-        loaded = [policies.load(gait) for gait in dict.fromkeys(gaits)]
+    def load(cls, gaits: Sequence[str], n: int, *, robot: Robot | None = None) -> "Driver":
+        """Drives by shipped policies of these gaits, or by policy files; begins in the first.
+
+        `robot` is what they are of; None: ANYmal B.
+        """
+        loaded = [policies.load(gait, robot or ANYMAL_B) for gait in dict.fromkeys(gaits)]
         return cls({policy.gait: policy for policy in loaded}, n, start=loaded[0].gait)
 
     @property

@@ -25,7 +25,7 @@ from gaitshift.learn.learner import Learner
 from gaitshift.learn.progress import last, trim
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.robot_file import from_dict, to_dict, use_robot
+from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.table import Row
@@ -58,6 +58,7 @@ class Run:
     ) -> None:
         self.folder = folder
         self.machine = machine
+        self.robot = robot
         self.recipe = recipe
         self.seed = seed
         self.command = command
@@ -120,7 +121,6 @@ class Run:
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
             robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
-            use_robot(robot)
             run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
         except (FileNotFoundError, NotADirectoryError) as error:
             raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error

@@ -32,7 +32,7 @@ class CpgConfig:
     """A swinging foot takes this long to get there [s]."""
     levelling: float = 0.3
     """Share of roll and pitch that standing legs push against."""
-    mass: float = 30.48
+    mass: float = ANYMAL_B.mass
     """Of the robot [kg]; standing legs are given the torques that bear it."""
     loading: float = 0.15
     """Share of a stance over which a leg takes its load on, and at its end off."""
@@ -48,11 +48,18 @@ class CpgController:
         gaits: Sequence[str],
         n: int,
         *,
+        robot: Robot | None = None,
         start: str | None = None,
         config: CpgConfig | None = None,
         network: HopfNetwork | None = None,
     ) -> None:
-        """All n robots begin in the gait `start`; None: in the first of the gaits."""
+        """All n robots begin in the gait `start`; None: in the first of the gaits.
+
+        Raises:
+            GaitshiftError: oscillators have no such gait, or the robot is not ANYmal B.
+        """
+        if robot is not None and robot != ANYMAL_B:
+            raise GaitshiftError(f"the oscillators know ANYmal B alone, got '{robot.name}'")
         unknown = [name for name in gaits if name not in GAITS]
         if unknown:
             raise GaitshiftError(

@@ -3,17 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.control import Controller, Driver, policy
+from gaitshift.control import Controller, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import measure, robot_mass
+from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.sim.terrain import Terrain, from_spec
@@ -38,8 +37,7 @@ class EvaluationConfig:
     """What a policy is put through."""
 
     terrain: str = "flat"
-    """Terrain: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a track of
-    pieces with lengths, such as flat@8,perlin:0.10@12."""
+    """Spec of the ground: one piece, or a track of them (`sim.terrain.spec_help`)."""
     episodes: int = 256
     """Number of robots; each runs one episode."""
     seconds: float = 10.0
@@ -90,7 +88,7 @@ def evaluate_controller(
     log = run_controller(controller, config, report=report)
     known = controller.repertoire
     machines = dict(zip(known.gaits, known.machines, strict=True))
-    return measure(log, machines, mass=robot_mass(controller.robot.name)), log
+    return measure(log, machines, controller.robot), log
 
 
 def run_policy(
@@ -204,15 +202,15 @@ VERDICT_FIGURES = (
 )
 
 
-def flat_verdict(path: Path) -> dict[str, Any]:
-    """The verdict on a policy file on flat ground, at its own speed and stride frequency.
+def flat_verdict(policy: Policy) -> dict[str, Any]:
+    """The verdict on a policy on flat ground, at its own speed and stride frequency.
 
     `gait` is the name by the contacts alone, `clean` whether it is the right one with all limits
     kept, `misses` the figures that miss theirs with the worst foot, parted by "; ". The others are
     as `gait_analysis.measure` defines them.
     """
     figures, _ = evaluate(
-        policy.load(path), EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS)
+        policy, EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS)
     )
     verdict = figures["verdict"]
     return {

@@ -4,7 +4,7 @@ import numpy as np
 
 from gaitshift.lab.gait_analysis.sample import Sample
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import Robot
 from gaitshift.robot.state import GRAVITY
 
 _SHORTEST_DRIFT = 0.5
@@ -14,8 +14,8 @@ Figure = float | None
 """None: there was nothing to measure."""
 
 
-def base_figures(sample: Sample, mass: float) -> dict[str, Figure]:
-    """What `measure` says of base and joints, for robots of `mass` [kg]."""
+def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
+    """What `measure` says of base and joints, for robots of this kind."""
     log, alive = sample.log, sample.alive
     if sample.steps == 0:
         return dict.fromkeys(_NAMES)
@@ -26,7 +26,7 @@ def base_figures(sample: Sample, mass: float) -> dict[str, Figure]:
     joint_speed = sensed.need("joint_velocity", "gait figures")[alive]
     power = sensed.power[alive]
     turn = sensed.need("angular_velocity_b", "gait figures")[..., :2][alive]
-    too_fast = np.abs(joint_speed).max(axis=-1) > ROBOTS[log.robot].velocity_limit
+    too_fast = np.abs(joint_speed).max(axis=-1) > robot.velocity_limit
     height = sensed.base_height[alive]
     values = (
         mean,
@@ -34,7 +34,7 @@ def base_figures(sample: Sample, mass: float) -> dict[str, Figure]:
         float(np.sqrt(np.square(speed - command).mean())),
         _heading_drift(sample),
         float(sensed.yaw[alive].std()),
-        float(power.mean(dtype=float)) / (mass * GRAVITY * max(abs(mean), 1e-3)),
+        float(power.mean(dtype=float)) / (robot.mass * GRAVITY * max(abs(mean), 1e-3)),
         mean**2 / (GRAVITY * max(float(np.median(height)), 1e-3)),
         float(turn[:, 0].std(dtype=float)),
         float(turn[:, 1].std(dtype=float)),

@@ -8,13 +8,10 @@ from jaxtyping import Bool, Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 from gaitshift.lab.log import Log
-from gaitshift.sim.terrain import sections_of
+from gaitshift.sim.terrain import KINDS, sections_of
 
-ROUGH = ("perlin",)
-"""Kinds of ground that are rough; a slope, a stair, a step or a pebble is not."""
-
-LEAST_AMPLITUDE = 0.05
-"""Noise of a smaller amplitude counts as flat [m]; ours: 5 cm is what a trot steps over."""
+_ROUGH_FROM = {kind.name: kind.rough_from for kind in KINDS if kind.rough_from is not None}
+"""Least number from which a kind of ground counts as rough; other kinds never do."""
 
 
 def rough_ground(log: Log) -> Bool[np.ndarray, "T N"]:
@@ -38,10 +35,10 @@ def is_rough(
     rough = np.zeros(x.shape, dtype=bool)
     for section in sections_of(terrain, x0, length):
         kind, _, number = section.name.partition(":")
-        if kind not in ROUGH:
+        if kind not in _ROUGH_FROM:
             continue
         try:
-            counts = float(number) >= LEAST_AMPLITUDE
+            counts = float(number or 0.0) >= _ROUGH_FROM[kind]
         except ValueError:
             raise GaitshiftError(
                 f"terrain '{section.name}': the part after ':' must be a number, got '{number}'"

@@ -11,7 +11,6 @@ from gaitshift.control import Autonomous, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.lab.evaluation.evaluate import grounds_of, starts
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import robot_mass
 from gaitshift.lab.identification import is_rough
 from gaitshift.lab.log import Log
 from gaitshift.lab.studies.batches import in_batches
@@ -122,11 +121,11 @@ def _batch(
         switcher=None if way.graph is None else Autonomous(way.graph, n, rough=rough),
         finish_x=float(start[:, 0].max()) + way_to_go,
     )
-    return measure_crossings(log, way_to_go)
+    return measure_crossings(log, way_to_go, driver.robot.mass)
 
 
-def measure_crossings(log: Log, way_to_go: float) -> Crossings:
-    """What a log says of its robots, each on a way of this length from where it starts [m]."""
+def measure_crossings(log: Log, way_to_go: float, mass: float) -> Crossings:
+    """What a log says of its robots: each of this mass [kg], on a way of this length [m]."""
     x = log.truth.base_position_w[..., 0].astype(float) - log.truth.base_position_w[0, :, 0]
     over = ((x >= way_to_go) | log.fallen).cumsum(axis=0) > 0
     # entries until the finish, the fall or the end, itself included
@@ -139,7 +138,7 @@ def measure_crossings(log: Log, way_to_go: float) -> Crossings:
     going = np.arange(len(x))[:, None] < count
     power = log.sensed.power.astype(float)
     work = (power * going).sum(axis=0) * period
-    weight = robot_mass(log.robot) * GRAVITY
+    weight = mass * GRAVITY
     far = distance >= 1.0
     changed = (np.diff(log.gait, axis=0) != 0) & going[1:]
     return Crossings(

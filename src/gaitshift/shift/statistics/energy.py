@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.state import GRAVITY, Proprioception
 from gaitshift.shift.statistic import SearchRange, check_positive
 
@@ -15,8 +16,8 @@ class CostOfTransport:
 
     window: float = 1.0
     """Power and speed are means that forget by e in this time [s]."""
-    mass: float = 30.48
-    """[kg]; ANYmal B's."""
+    mass: float = ANYMAL_B.mass
+    """[kg]; of another robot its `Robot.mass`."""
     least_speed: float = 0.1
     """A slower robot counts as this fast [m/s]."""
 

@@ -8,7 +8,7 @@ from jaxtyping import Float, Shaped
 
 from gaitshift.gait import gaits
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import Robot
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.geometry import Shape, frames_of, ground_grid, plane_corners
 from gaitshift.show.plots.palette import GROUND, LEG_COLOURS, gait_colours
@@ -30,8 +30,8 @@ _AROUND = 3.0
 _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
 
 
-def run_data(log: Log, robot: int) -> dict[str, Any]:
-    """One robot of a log.
+def run_data(log: Log, robot: int, description: Robot) -> dict[str, Any]:
+    """One robot of a log of such robots.
 
     `time` [s], `contact` (bit i: foot i of `LEGS` is down) and `gait` have an entry a control step;
     `position` and `rotation` (w, x, y, z) of each of the `bodies`, `feet` and the corners of the
@@ -39,11 +39,11 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
     """
     alone = log.robots(slice(robot, robot + 1))
     frames = frames_of(alone, EVERY)
-    shape = Shape(ROBOTS[log.robot])
+    shape = Shape(description)
     position, rotation = shape.poses(np.concatenate([frame.step.qpos for frame in frames]))
     place = alone.truth.base_position_w[:, 0, :2].astype(float)
     feet = np.concatenate([frame.step.truth.foot_position_w for frame in frames])
-    feet[..., 2] += ROBOTS[log.robot].foot_radius
+    feet[..., 2] += description.foot_radius
     planes = [_plane(frame.touch_w[0]) for frame in frames]
     bits = (alone.sensed.contact[:, 0] * (1 << np.arange(len(LEGS)))).sum(axis=1)
     return {
@@ -58,7 +58,7 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
             for name, colour in gait_colours(log.gaits).items()
         ],
         "shifts": shift_times(log, robot),
-        "footRadius": ROBOTS[log.robot].foot_radius,
+        "footRadius": description.foot_radius,
         "bodies": [
             {
                 "name": body.name,

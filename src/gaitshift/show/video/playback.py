@@ -6,7 +6,7 @@ from jaxtyping import UInt8
 from PIL import ImageColor
 
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import Robot
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.plots.palette import gait_colours
 from gaitshift.show.plots.signals import gait_at, ground_of
@@ -22,13 +22,13 @@ _GLOW = 1.3
 class Playback:
     """Draws one robot of a log. A context manager: OpenGL's memory is freed at its end."""
 
-    def __init__(self, log: Log, robot: int, width: int, height: int) -> None:
+    def __init__(self, log: Log, robot: int, description: Robot, width: int, height: int) -> None:
         self._log, self._robot = log, robot
         self._qpos = log.qpos[:, robot]
-        self._radius = ROBOTS[log.robot].foot_radius
+        self._radius = description.foot_radius
         self._colours = gait_colours(log.gaits)
         place = log.truth.base_position_w[:, robot, :2]
-        scene = build_scene(ROBOTS[log.robot], ground_of(log), place, width, height)
+        scene = build_scene(description, ground_of(log), place, width, height)
         self._texture = scene.texture
         self._model, self._data = scene.model, mujoco.MjData(scene.model)
         self._paint = Paint(scene)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.show.plots.palette import gait_colours
 from gaitshift.show.plots.signals import (
     check_robot,
@@ -33,6 +33,7 @@ def render(
     path: Path,
     robot: int = 0,
     *,
+    description: Robot = ANYMAL_B,
     width: int = 1280,
     height: int = 720,
     fps: int = 30,
@@ -40,7 +41,7 @@ def render(
     t1: float = float("inf"),
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Writes an MP4 video (H.264) of one robot from `t0` to `t1` [s].
+    """Writes an MP4 video (H.264) of one robot from `t0` to `t1` [s], in a log of such robots.
 
     Feet that touch glow in the colour of the gait and leave prints; the strip below tells the gait,
     k against its threshold, the forward speed and the time. `report` is called with the pictures
@@ -48,17 +49,18 @@ def render(
 
     Raises:
         VideoUnavailable: no OpenGL, or no ffmpeg, on this machine.
-        GaitshiftError: no such robot, nothing in that time, a robot whose ground the log does not
-            keep, a size or rate that makes no video, another file ending, or no such folder.
+        GaitshiftError: no such robot, a log of another kind of robot, nothing in that time, a
+            robot whose ground the log does not keep, a size or rate that makes no video, another
+            file ending, or no such folder.
     """
     _check_target(path, width, height, fps)
-    _check_log(log, robot)
+    _check_log(log, robot, description)
     log = window(log, t0, t1)
     entries = _entries(log, fps)
     readings = _readings(log, robot)
     strip = Strip(width, height)
     with (
-        Playback(log, robot, width, height - strip.height) as playback,
+        Playback(log, robot, description, width, height - strip.height) as playback,
         FilmWriter(path, width, height, fps) as film,
     ):
         for done, entry in enumerate(entries):
@@ -79,12 +81,9 @@ def _check_target(path: Path, width: int, height: int, fps: int) -> None:
         raise GaitshiftError(f"fps must be 1 to 120, got {fps}")
 
 
-def _check_log(log: Log, robot: int) -> None:
+def _check_log(log: Log, robot: int, description: Robot) -> None:
     check_robot(log, robot)
-    if log.robot not in ROBOTS:
-        raise GaitshiftError(
-            f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
-        )
+    description.check_is(log.robot, "the log")
     if not walks_on_kept_ground(log, robot):
         raise GaitshiftError(
             f"robot must be 0 where robots have different terrains, as the log keeps only that of "

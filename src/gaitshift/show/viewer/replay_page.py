@@ -6,11 +6,10 @@ from typing import Any, cast
 
 import viser
 
-from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.show.geometry import frames_of
 from gaitshift.show.plots.signals import check_robot, ground_of
 from gaitshift.show.viewer.charts import Charts
@@ -26,14 +25,12 @@ _EVERY = round(TICK / CONTROL_PERIOD)
 class ReplayPage:
     """Puts a log on a page."""
 
-    def __init__(self, server: viser.ViserServer, log: Log) -> None:
-        if log.robot not in ROBOTS:
-            raise GaitshiftError(
-                f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
-            )
+    def __init__(self, server: viser.ViserServer, log: Log, robot: Robot = ANYMAL_B) -> None:
+        """`robot` is what the log is of; `GaitshiftError` where it is of another one."""
+        robot.check_is(log.robot, "the log")
         check_robot(log, 0)
         self._frames = frames_of(_few(log), _EVERY)
-        self._scene = Scene(server, ROBOTS[log.robot], log.gaits)
+        self._scene = Scene(server, robot, log.gaits)
         self._scene.set_ground(ground_of(log))
         self._scene.set_robots(self._frames[0].step.n)
         self._tape, self._at, self._plays = Tape(), 0, True

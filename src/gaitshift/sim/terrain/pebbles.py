@@ -6,9 +6,9 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.grid import FINE_CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.quantity import Quantity, spell
+from gaitshift.sim.terrain.kind import Kind, Quantity, spell
 
-PEBBLE_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
+_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
 """Of the highest pebble."""
 
 _DENSITY = Quantity(name="density", unit="pebbles per m²", low=0.01, high=100.0)
@@ -39,7 +39,7 @@ def pebbles(
     `GaitshiftError` where a number is out of range, or `cell` is longer than half of the smallest
     diameter: a bump between the samples would be lost.
     """
-    PEBBLE_HEIGHT.check(height)
+    _HEIGHT.check(height)
     _DENSITY.check(density)
     smallest, largest = (_DIAMETER.check(value) for value in diameter)
     if smallest > largest:
@@ -75,3 +75,16 @@ def _strewn(
         bump = share[n] * np.maximum(1.0 - squared / radius[n] ** 2, 0.0) ** 2
         height[rows, cols] = np.maximum(height[rows, cols], bump)
     return height
+
+
+KINDS = (
+    Kind(
+        name="pebbles",
+        number=_HEIGHT,
+        cell=FINE_CELL,
+        meaning="round bumps 0.1 to 0.2 m wide, 4 a square metre, the highest this high",
+        make=lambda number, seed, length, width, cell: pebbles(
+            number, seed=seed, length=length, width=width, cell=cell
+        ),
+    ),
+)

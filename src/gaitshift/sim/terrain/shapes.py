@@ -8,15 +8,15 @@ from jaxtyping import Float, Int
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.grid import CELL, FINE_CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.quantity import Quantity, spell
+from gaitshift.sim.terrain.kind import Kind, Quantity, spell
 
-INCLINE = Quantity(name="angle", unit="degrees", low=-45.0, high=45.0)
+_INCLINE = Quantity(name="angle", unit="degrees", low=-45.0, high=45.0)
 """Of a slope. Ours: at 45° feet slip unless friction is above 1."""
 
-RISE = Quantity(name="rise", unit="m", low=0.0, high=1.0)
+_RISE = Quantity(name="rise", unit="m", low=0.0, high=1.0)
 """Of one stair."""
 
-STEP_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
+_STEP_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
 """Of the single step."""
 
 _RUN = Quantity(name="run", unit="m", low=0.05, high=5.0)
@@ -50,7 +50,7 @@ def slope(
     grid = Grid(length=length, width=width, cell=cell)
     ahead, left = np.cos(np.radians(towards)), np.sin(np.radians(towards))
     along = ahead * grid.x + left * (grid.y - width / 2)[:, None]
-    height = np.tan(np.radians(INCLINE.check(degrees))) * along
+    height = np.tan(np.radians(_INCLINE.check(degrees))) * along
     return grid.terrain(height, name=spell("slope", degrees), origin=origin)
 
 
@@ -87,7 +87,7 @@ def stairs(
 
     `GaitshiftError` where a number is out of range or not even one step has room.
     """
-    RISE.check(rise)
+    _RISE.check(rise)
     _RUN.check(run)
     _FLIGHT.check(float(flight))
     _LANDING.check(landing)
@@ -118,7 +118,7 @@ def step(
 
     The face leans over the cell it lies in. `GaitshiftError` where a number is out of range.
     """
-    STEP_HEIGHT.check(height)
+    _STEP_HEIGHT.check(height)
     grid = Grid(length=length, width=width, cell=cell)
     profile = np.where(_whole(grid.x / (length / 2)) >= 1, height, 0.0)
     return grid.terrain(profile, name=spell("step", height), origin=origin)
@@ -127,3 +127,50 @@ def step(
 def _whole(ratio: Float[np.ndarray, "*shape"]) -> Int[np.ndarray, "*shape"]:
     """Whole part of a ratio of lengths; one that is whole but for rounding is whole."""
     return np.asarray(np.floor(ratio + 1e-9)).astype(int)
+
+
+KINDS = (
+    Kind(
+        name="flat",
+        number=None,
+        cell=CELL,
+        meaning="level ground",
+        make=lambda number, seed, length, width, cell: flat(length, width, cell=cell),
+    ),
+    Kind(
+        name="slope",
+        number=_INCLINE,
+        cell=CELL,
+        meaning="a plane rising along +x; negative: downhill",
+        make=lambda number, seed, length, width, cell: slope(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="bank",
+        number=_INCLINE,
+        cell=CELL,
+        meaning="a plane rising along +y, to walk across",
+        make=lambda number, seed, length, width, cell: bank(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="stairs",
+        number=_RISE,
+        cell=FINE_CELL,
+        meaning="up to ten steps of this height and 0.30 m depth up to a landing, and down again",
+        make=lambda number, seed, length, width, cell: stairs(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="step",
+        number=_STEP_HEIGHT,
+        cell=FINE_CELL,
+        meaning="one step up, across the middle",
+        make=lambda number, seed, length, width, cell: step(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+)

@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.height_field import Section, Terrain
-from gaitshift.sim.terrain.quantity import Quantity
-from gaitshift.sim.terrain.smoothstep import smoothstep
+from gaitshift.sim.terrain.kind import Quantity
+from gaitshift.sim.terrain.perlin import smoothstep
 
 _BORDER = Quantity(name="border", unit="m", low=0.1, high=100.0)
 
