@@ -1,7 +1,7 @@
 """Controllers by their names on the command line: one file each, and a line here."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from gaitshift.control.controller import Controller
 from gaitshift.control.cpg import CpgController
@@ -10,6 +10,7 @@ from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
 
 
+@runtime_checkable
 class ControllerMaker(Protocol):
     """Makes a controller of n robots, all in the first of the gaits."""
 
