@@ -64,7 +64,7 @@ def random_sensed(rng, n, step):
 
 
 def strolling(height, *, seconds=4.0, speed=1.0, turn=0.2, wobble=0.15):
-    """Where the base of a robot is [m] that trots over ground of a height(x, y), and what it senses.
+    """A robot that trots over ground of a height(x, y): where its base is [m], what it senses.
 
     Feet stand still in the world while they touch, and the body rolls and pitches meanwhile.
     """

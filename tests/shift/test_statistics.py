@@ -1,4 +1,4 @@
-"""Laws that every statistic keeps: robots one by one, invariances, and nothing but what is sensed."""
+"""Laws of every statistic: robots one by one, invariances, nothing but what is sensed."""
 
 from dataclasses import fields, is_dataclass, replace
 
@@ -192,8 +192,12 @@ def test_an_oracle_shifts_where_the_truth_says_rough_and_back_where_not():
         state, _ = graph.step(state, sensed, np.array(rough, dtype=bool))
         seen.append([graph.gaits[index] for index in state.gait])
     assert seen == [
-        ["trot", "trot"], ["bound", "trot"], ["bound", "bound"], ["trot", "bound"], ["trot", "trot"],
-    ]  # fmt: skip
+        ["trot", "trot"],
+        ["bound", "trot"],
+        ["bound", "bound"],
+        ["trot", "bound"],
+        ["trot", "trot"],
+    ]
 
 
 @pytest.mark.parametrize("kind", BY_SENSES)
