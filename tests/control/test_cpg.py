@@ -21,7 +21,7 @@ from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.legs import LEGS
-from gaitshift.shift import Condition, GaitGraph, TouchdownSurprise
+from gaitshift.shift import Rule, TouchdownSurprise, there_and_back
 from gaitshift.sim.terrain import from_spec
 from gaitshift.sim.world import World
 
@@ -128,14 +128,9 @@ def test_robots_keep_on_their_feet_on_mild_noise(name, ground):
 
 def test_oscillators_shift_by_the_very_condition_of_trained_policies():
     """Trot to bound on noise, by an α between what flat ground and the noise show."""
-    condition = Condition(
-        statistic=TouchdownSurprise(),
-        alpha=0.002,
-        beta=5.0,
-        alpha_back=0.005,
-        beta_back=1e6,
+    graph = there_and_back(
+        TouchdownSurprise(), Rule(alpha=0.002, beta=5.0), Rule(when="below", alpha=0.005, beta=1e6)
     )
-    graph = GaitGraph.of(condition, flat="trot", rough="bound")
     n = 6
     controller = CpgController(["trot", "bound"], n, start="trot")
     ground = from_spec("flat@5,perlin:0.06@8", seed=3, length=1.0, width=8.0)

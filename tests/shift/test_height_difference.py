@@ -30,7 +30,7 @@ def feet_at(z):
 
 
 def heights_of(frame, feet_b, gravity_b):
-    """h (4,) of a robot that stands on all feet."""
+    """H (4,) of a robot that stands on all feet."""
     statistic = HeightDifference(frame=frame)
     sensed = standing(foot_position_b=feet_b, orientation=orientation_of(gravity_b))
     return statistic.step(statistic.start(1), sensed)[0][0]

@@ -300,7 +300,7 @@ def test_the_papers_two_gaits_are_a_graph_of_two_edges_with_the_papers_numbers()
     assert back.rule == Rule(when="below", alpha=0.2, beta=1000, epsilon=1)
     assert PAPER.statistics == {"ground": HeightDifference(frame="body")}
     assert PAPER.reset
-    assert PAPER == there_and_back(HeightDifference(frame="body"), there.rule, back.rule)
+    assert there_and_back(HeightDifference(frame="body"), there.rule, back.rule) == PAPER
 
 
 def test_one_gait_for_flat_and_rough_is_refused():
@@ -344,7 +344,7 @@ def test_a_bad_number_is_refused_in_one_line_that_says_which_way_and_what_is_all
 
 
 def test_an_unknown_number_is_refused_with_those_there_are():
-    with pytest.raises(GaitshiftError, match="unknown number 'gamma'.*alpha_back"):
+    with pytest.raises(GaitshiftError, match=r"unknown number 'gamma'.*alpha_back"):
         tuned(PAPER, gamma=1.0)
 
 
