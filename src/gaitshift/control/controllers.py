@@ -1,7 +1,7 @@
 """Controllers by their names on the command line: one file each, and a line here."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from gaitshift.control.controller import Controller
 from gaitshift.control.cpg import CpgController
@@ -11,6 +11,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.description import Robot
 
 
+@runtime_checkable
 class ControllerMaker(Protocol):
     """Makes a controller of n robots, all in the first of the gaits."""
 
