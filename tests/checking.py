@@ -6,14 +6,20 @@ callers hand it; the sample of later ones shows what comes up in a long run.
 
 import functools
 import inspect
+import typing
 from dataclasses import is_dataclass
 
 import jaxtyping
-from beartype import BeartypeConf, beartype
+from beartype import BeartypeConf, FrozenDict, beartype
 from jaxtyping import install_import_hook
 
-check_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
-"""beartype that takes an int for a float, as type checkers do (PEP 484)."""
+check_types = beartype(
+    conf=BeartypeConf(is_pep484_tower=True, hint_overrides=FrozenDict({typing.Self: object}))
+)
+"""beartype that takes an int for a float, as type checkers do (PEP 484).
+
+It knows `Self` where it decorates whole classes alone, so that here anything may stand for it.
+"""
 
 FIRST, EVERY = 50, 20
 """ours: of each function's calls in a test, the first 50 are checked and then one in 20."""

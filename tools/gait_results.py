@@ -13,7 +13,6 @@ from gaitshift.control import policy
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import SIZES
 from gaitshift.lab.gait_analysis import FIRST_GAITS
-from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.legs import LEGS
 from gaitshift.table import markdown
 
@@ -48,9 +47,8 @@ by `tools/gait_results.py` from the records beside the policies.
 
 TRAINING = """## Training
 
-The policies come from more than one recipe and seed. Those of {iterations} iterations are made by
-the default recipe. No preset holds the recipe of the others, so their command now makes another
-policy ([both recipes](training-recipe.md)).
+The policies come from more than one recipe and seed. The records beside them name both, and
+`make policies` trains by them ([both recipes](training-recipe.md)).
 """
 
 TRIALS = """## Trials
@@ -79,7 +77,7 @@ def page() -> str:
         seconds=size.seconds,
     )
     parts = [head, _figures(records)]
-    parts += [TRAINING.format(iterations=Recipe().iterations), _training(records)]
+    parts += [TRAINING, _training(records)]
     parts += [TRIALS.format(pushed=size.pushed, episodes=size.episodes), _trials(records)]
     parts += [COMMANDS, _commands(records)]
     parts += [_gait(name, record) for name, record in records.items()]
@@ -181,7 +179,7 @@ def _gait(name: str, record: dict[str, Any]) -> str:
     ]
     lines = [f"## {machine.title}\n", f"{machine.description}\n"]
     lines.append(f"![Gait diagram and phases of {name}](gaits/{name}.png)\n")
-    recipe = "" if record["iterations"] == Recipe().iterations else ", with an earlier recipe"
+    recipe = f", preset `{record['preset']}`"
     made, judged = record["command"], record["evaluation"]["command"]
     lines.append(f"Made by `{made}`{recipe}, judged by `{judged}`.")
     lines.append(f"[Its training](training/{name}.png).\n")

@@ -12,7 +12,7 @@ from gaitshift.gait import gaits
 from gaitshift.learn.learner import Learner, as_tensors
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
 from symmetric import symmetric_robot
 
@@ -64,7 +64,7 @@ def twins(gait, robot, *, steps=STEPS):
     machine = replace(machine, dwell_range=(4, machine.dwell_range[1]))
     config = EnvConfig(command_interval=10_000)
     env = GaitEnv(machine, flat(20.0, 20.0), 2 * ROBOTS, config=config, robot=robot, threads=1)
-    env.strictness = 0.0
+    env.curriculum = Curriculum(strictness=0.0)
     env.reset(seed=1)
     rng = np.random.default_rng(2)
 

@@ -23,7 +23,7 @@ from gaitshift.lab.gait_analysis.phase import Phases, axial_of, ideal_of, phase_
 from gaitshift.lab.gait_analysis.sample import steady
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
-from synthetic import TABLE, contacts, log_of
+from synthetic import TABLE, contacts, log_of, turned
 
 TROT = gaits.load("trot")
 LIGHT = replace(ANYMAL_B, mass=20.0)
@@ -44,20 +44,21 @@ def trotting(*, speed: float, period: int, steps: int, fallen_from: int | None) 
     left = (np.arange(steps) % period) < period // 2
     contact = np.zeros((steps, 2, 4), dtype=bool)
     contact[:, 0] = np.where(left[:, None], [1, 0, 0, 1], [0, 1, 1, 0])
-    qpos, qvel = np.zeros((steps, 2, 19)), np.zeros((steps, 2, 18))
-    qpos[..., 2], qpos[..., 3] = 0.45, 1.0
-    qpos[:, 0, 0], qvel[:, 0, 0], qvel[:, 0, 6] = speed * np.arange(steps) / 100, speed, 2.0
-    torque = np.zeros((steps, 2, 12))
-    torque[:, 0, 0] = -30.0
+    position, velocity = np.zeros((steps, 2, 3)), np.zeros((steps, 2, 3))
+    position[..., 2] = 0.45
+    position[:, 0, 0], velocity[:, 0, 0] = speed * np.arange(steps) / 100, speed
+    joint_velocity, torque = np.zeros((steps, 2, 12)), np.zeros((steps, 2, 12))
+    joint_velocity[:, 0, 0], torque[:, 0, 0] = 2.0, -30.0
     fallen = np.zeros((steps, 2), dtype=bool)
     if fallen_from is not None:
         fallen[fallen_from:, 1] = True
     still = np.zeros(steps, dtype=np.int64)
     return log_of(
         contact,
-        qpos=qpos,
-        qvel=qvel,
-        torque=torque,
+        base_position_w=position,
+        velocity_b=velocity,
+        joint_velocity=joint_velocity,
+        joint_torque=torque,
         fallen=fallen,
         machine_state=np.stack([np.where(left, 0, 1), still], axis=1),
         stance_shown=np.stack([still == 0, still == 1], axis=1),
@@ -108,10 +109,9 @@ def test_a_log_shorter_than_the_warm_up_has_no_figures_but_survival_and_line():
 
 def test_drift_is_the_turn_that_was_not_commanded():
     """One robot turns at 0.3 rad/s though told 0.1, another as told: √(0.2²/2), past ± π too."""
-    log = log_of(np.zeros((2200, 2, 4), dtype=bool))
     yaw = np.outer(np.arange(2200) / 100, [0.3, 0.1])
-    log.qpos[..., 3], log.qpos[..., 6] = np.cos(yaw / 2), np.sin(yaw / 2)
-    log.command[..., 1] = 0.1
+    contact = np.zeros((2200, 2, 4), dtype=bool)
+    log = log_of(contact, quaternion=turned(yaw), yaw_rate_command=0.1)
     drift = measure(log, {"trot": TROT}, LIGHT)["heading_drift"]
     assert drift == pytest.approx(0.2 / np.sqrt(2), rel=1e-3)
 
@@ -120,8 +120,8 @@ def test_clearance_is_the_median_of_the_highest_point_of_each_stride():
     """Swings of FL reach 2, 4 and 9 cm in turn; a bounce in between is no swing."""
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
     stride = np.arange(1200) // 40
-    log.clearance[30::40, 0, 0] = np.array([0.02, 0.04, 0.09])[stride[30::40] % 3]
-    log.contact[10:1200:40, 0, 0] = False
+    log.truth.clearance[30::40, 0, 0] = np.array([0.02, 0.04, 0.09])[stride[30::40] % 3]
+    log.sensed.contact[10:1200:40, 0, 0] = False
     figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["clearance"][0] == pytest.approx(0.04)
     assert figures["touchdowns_per_cycle"][0] == pytest.approx(2.0)

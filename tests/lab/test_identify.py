@@ -9,7 +9,7 @@ import pytest
 
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import Recording, auc, sources
+from gaitshift.lab.identification import LabelledRun, auc, sources
 from gaitshift.lab.identification.candidates import CANDIDATES
 from gaitshift.lab.identification.classifier import RoughnessClassifier
 from gaitshift.lab.identification.judging import judge, replay_rules
@@ -17,7 +17,9 @@ from gaitshift.lab.identification.passage import passage_scores
 from gaitshift.lab.identification.statistics import auc_interval
 from gaitshift.lab.identification.tuning import as_given, try_grids, tune
 from gaitshift.robot.legs import LEGS
+from gaitshift.robot.state import Proprioception
 from gaitshift.shift import Rule
+from synthetic import turned
 
 PERIOD = 0.01
 FEET = np.array(
@@ -49,16 +51,27 @@ def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
             feet[:, robot, leg] = FEET[leg]
             feet[:, robot, leg, 0] += np.where(down, 0.25 - phase * 0.5, 0.0)
             feet[:, robot, leg, 2] += np.where(down, level[stride] * size, 0.1)
-    return Recording(
-        name=name,
-        time=time,
+    sensed = Proprioception(
         contact=contact,
         foot_position_b=feet,
-        gravity_b=np.tile([0.0, 0.0, -1.0], (steps, robots, 1)),
+        orientation=turned(np.zeros((steps, robots))),
+        has_heading=False,
+        time=time,
+        period=PERIOD,
+    )
+    return LabelledRun(
+        name=name,
+        sensed=sensed,
         rough=rough.copy(),
         alive=np.ones((steps, robots), dtype=bool),
         distance=np.tile(time[:, None], (1, robots)),
     )
+
+
+def backwards(run):
+    """The same steps from the last to the first."""
+    sensed = replace(run.sensed[::-1], time=run.sensed.time)
+    return replace(run, sensed=sensed, rough=run.rough[::-1].copy())
 
 
 def tuned_by(candidates, recordings, way):
@@ -142,13 +155,8 @@ def test_numbers_that_are_given_are_judged_as_those_that_are_chosen():
 
 
 def test_the_way_back_notices_that_rough_ground_has_ended():
-    ahead = march("out-of", noise=0.04, seed=2)
-    turned = {
-        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
-    }
-
     def out():
-        return [replace(ahead, **turned)]
+        return [backwards(march("out-of", noise=0.04, seed=2))]
 
     (tuned,) = tuned_by(height_candidates()[:1], out(), way="flat")
     assert tuned.rule.when == "below"
@@ -158,13 +166,8 @@ def test_the_way_back_notices_that_rough_ground_has_ended():
 
 
 def test_on_the_way_back_an_oracle_notices_the_very_step_in_which_rough_ground_ends():
-    ahead = march("out-of", noise=0.04, seed=2)
-    turned = {
-        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
-    }
-
     def out():
-        return [replace(ahead, **turned)]
+        return [backwards(march("out-of", noise=0.04, seed=2))]
 
     tuned = tuned_by([c for c in CANDIDATES if c.name == "oracle"], out(), way="flat")
     (judged,) = judged_by(tuned, out())
@@ -219,8 +222,8 @@ def table(path, recording):
                     int(recording.rough[t, 0]),
                     0.0,
                     0.0,
-                    *recording.contact[t, 0].astype(int),
-                    *recording.foot_position_b[t, 0].ravel(),
+                    *recording.sensed.contact[t, 0].astype(int),
+                    *recording.sensed.foot_position_b[t, 0].ravel(),
                 ]
             )
     return path

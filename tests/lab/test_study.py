@@ -14,6 +14,7 @@ from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, strategies
 from gaitshift.lab.studies.crossing_table import COLUMNS, mean_of, row_of
 from gaitshift.show.plots.crossings import crossings_figure
+from synthetic import changed
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 BOTH = {"trot": TROT, "bound": BOUND}
@@ -24,17 +25,16 @@ MASS, GRAVITY = 30.4754, 9.81
 def log():
     """Three robots for 5 s, as if on rails: 1 m/s, all joints turning at 2 rad/s with 5 N m."""
     config = DemoConfig(gaits=("trot", "bound"), at=(4.8,), episodes=3, every=0.2)
-    real = run_demo(config, BOTH)[0]
-    qpos, qvel = np.zeros_like(real.qpos), np.zeros_like(real.qvel)
-    qpos[..., 0] = 7.0 + 0.01 * np.arange(len(real.time))[:, None]
-    qvel[..., 6:] = 2.0
-    return replace(
+    real = run_demo(config)[0]
+    place = np.zeros((len(real.time), 1, 3))
+    place[:, 0, 0] = 7.0 + 0.01 * np.arange(len(real.time))
+    return changed(
         real,
-        qpos=qpos,
-        qvel=qvel,
-        torque=np.full_like(real.torque, -5.0),
-        fallen=np.zeros_like(real.fallen),
-        gait=np.zeros_like(real.gait),
+        base_position_w=place,
+        joint_velocity=2.0,
+        joint_torque=-5.0,
+        fallen=False,
+        gait=0,
     )
 
 

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from gaitshift.lab.studies.transitions import measure_shifts, running_mean
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.show.plots.transitions import transition_map
 from gaitshift.table import read_typed
+from synthetic import changed
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 
@@ -24,13 +24,13 @@ TROT, BOUND = policy.load("trot"), policy.load("bound")
 def walk():
     """A log of two robots that trot for 8 s."""
     config = DemoConfig(gaits=("trot", "bound"), at=(7.9,), episodes=2, every=0.2)
-    return run_demo(config, {"trot": TROT, "bound": BOUND})[0]
+    return run_demo(config)[0]
 
 
 def shifted(log, at=200, **changes):
-    log = replace(
-        log, **{name: change(getattr(log, name).copy()) for name, change in changes.items()}
-    )
+    """Outcomes where functions of copies replace arrays: `contact`, or any of the log or truth."""
+    arrays = {"contact": log.sensed.contact, **vars(log.truth), **vars(log)}
+    log = changed(log, **{name: change(arrays[name].copy()) for name, change in changes.items()})
     return measure_shifts(log, np.full(2, at), TROT, BOUND)
 
 
@@ -78,20 +78,17 @@ def test_a_fall_within_five_seconds_is_a_failure_and_one_after_is_not(walk):
 def test_tilt_and_dip_are_those_of_the_motion(walk):
     roll = 0.4
 
-    def lies(qpos):
-        qpos[300, :, 3:7] = [np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0]
-        return qpos
+    def lies(quaternion):
+        quaternion[:] = [1.0, 0.0, 0.0, 0.0]
+        quaternion[300] = [np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0]
+        return quaternion
 
-    def slows(qvel):
-        qvel[..., :2] = [1.0, 0.0]
-        qvel[400:460, 0, 0] = 0.3
-        return qvel
+    def slows(velocity):
+        velocity[..., :2] = [1.0, 0.0]
+        velocity[400:460, 0, 0] = 0.3
+        return velocity
 
-    def straight(qpos):
-        qpos[..., 3:7] = [1.0, 0.0, 0.0, 0.0]
-        return lies(qpos)
-
-    outcomes = shifted(walk, qpos=straight, qvel=slows)
+    outcomes = shifted(walk, base_quaternion_w=lies, velocity_b=slows)
     assert outcomes.tilt == pytest.approx(roll, abs=1e-3)
     slower = min(TROT.info.forward_speed, BOUND.info.forward_speed)
     assert outcomes.dip == pytest.approx([slower - 0.3, slower - 1.0])

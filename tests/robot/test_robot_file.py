@@ -48,11 +48,11 @@ def test_it_stands_and_bears_its_weight_on_four_feet():
     world = World(robot, flat(10.0, 10.0), 2)
     for _ in range(200):
         world.step(np.tile(robot.stance_angles, (2, 1)))
-    motion = world.motion
+    sensed, truth = world.sensed, world.truth
     weight = 9.81 * world.model.body_mass.sum()
-    assert motion.contact.all()
-    assert not motion.body_contact.any()
-    assert motion.foot_force.sum(axis=1) == pytest.approx(np.full(2, weight), rel=0.02)
+    assert sensed.contact.all()
+    assert not truth.body_contact.any()
+    assert truth.foot_force.sum(axis=1) == pytest.approx(np.full(2, weight), rel=0.02)
     assert world.model.body_mass.sum() == robot.mass == pytest.approx(12.5, abs=0.1)
 
 
@@ -64,8 +64,8 @@ def test_turned_about_by_its_mirror_it_is_itself():
     mirrored = swung[[1, 0, 3, 2]] * [-1.0, 1.0, 1.0]
     target = np.stack([swung.ravel(), mirrored.ravel()])
     for _ in range(30):
-        motion = world.step(target)
-    feet = motion.foot_position_w
+        _, truth = world.step(target)
+    feet = truth.foot_position_w
     np.testing.assert_allclose(feet[1][[1, 0, 3, 2]] * [1.0, -1.0, 1.0], feet[0], atol=2e-3)
 
 

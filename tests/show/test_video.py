@@ -22,6 +22,7 @@ from gaitshift.show.video.paint import Paint
 from gaitshift.show.video.scene import SUN, build_scene
 from gaitshift.show.video.strip import Reading, Strip
 from gaitshift.sim.terrain import flat, from_spec
+from synthetic import changed, log_of, turned
 from waiting import PATIENCE
 
 AT_ZERO = np.zeros((2, 2))
@@ -34,39 +35,23 @@ def slide(steps: int = 40, ground: str = "perlin:0.05") -> Log:
     """A robot in its stance, sliding along +x at 1 m/s, its feet touching in turn, as `pace`."""
     terrain = from_spec(ground, seed=1, length=8.0, width=6.0)
     time = np.arange(1, steps + 1) / 100
-    qpos = np.zeros((steps, 1, 19))
-    qpos[:, 0, 0] = 3.0 + time
-    qpos[:, 0, 2] = terrain.height_at(qpos[:, 0, :2]) + ANYMAL_B.stance_height
-    qpos[:, 0, 3], qpos[:, 0, 7:] = 1.0, ANYMAL_B.stance
-    qvel = np.zeros((steps, 1, 18))
-    qvel[:, 0, 0] = 1.0
+    base = np.zeros((steps, 1, 3))
+    base[:, 0, 0] = 3.0 + time
+    base[..., 2] = terrain.height_at(base[..., :2]) + ANYMAL_B.stance_height
     offset = np.array([[0.35, 0.2], [0.35, -0.2], [-0.35, 0.2], [-0.35, -0.2]])
     feet = np.zeros((steps, 1, 4, 3))
-    feet[:, 0, :, :2] = qpos[:, :, :2] + offset
+    feet[..., :2] = base[:, :, None, :2] + offset
     feet[..., 2] = terrain.height_at(feet[..., :2])
-    contact = np.arange(steps)[:, None, None] // 10 % 4 == np.arange(4)
-    return Log(
-        time=time,
-        qpos=qpos,
-        qvel=qvel,
-        torque=np.zeros((steps, 1, 12)),
-        contact=contact,
+    return log_of(
+        np.arange(steps)[:, None, None] // 10 % 4 == np.arange(4),
+        base_position_w=base,
+        velocity_b=[1.0, 0.0, 0.0],
         foot_position_w=feet,
-        clearance=np.zeros((steps, 1, 4)),
-        foot_height=np.zeros((steps, 1, 4)),
         k=10.0 * time[:, None],
-        threshold=np.full((steps, 1), 20.0),
-        gait=np.zeros((steps, 1), dtype=int),
-        machine_state=np.zeros((steps, 1), dtype=int),
-        stance_shown=np.ones((steps, 1), dtype=bool),
-        fallen=np.zeros((steps, 1), dtype=bool),
-        command=np.zeros((steps, 1, 3)),
+        threshold=20.0,
+        stance_shown=True,
         gaits=("pace",),
-        robot="anymal_b",
-        terrain=ground,
-        terrain_height=terrain.height,
-        terrain_size=np.array(terrain.size),
-        terrain_origin=np.array(terrain.origin),
+        terrain=terrain,
     )
 
 
@@ -194,20 +179,19 @@ def test_a_robot_beside_the_ground_casts_no_shadow_and_leaves_no_print():
 
 def test_camera_does_not_bob_with_the_body_and_goes_as_fast():
     log = slide(300, "flat")
-    qpos = log.qpos.copy()
-    qpos[:, 0, 2] += 0.03 * np.sin(2 * np.pi * 4 * log.time)
-    views = follow(replace(log, qpos=qpos), 0)
+    base = log.truth.base_position_w.copy()
+    base[:, 0, 2] += 0.03 * np.sin(2 * np.pi * 4 * log.time)
+    views = follow(changed(log, base_position_w=base), 0)
     target = np.array([view.target for view in views])
     assert np.abs(np.diff(target[:, 2])).max() < 1e-4  # the body: 0.75 m/s, the camera: 1 cm/s
-    assert np.allclose(target[:, 0], log.qpos[:, 0, 0])
+    assert np.allclose(target[:, 0], base[:, 0, 0])
 
 
 def test_camera_turns_with_the_robot():
     log = slide(300, "flat")
-    qpos = log.qpos.copy()
-    qpos[:, 0, 3] = qpos[:, 0, 6] = np.sqrt(0.5)
-    turned = follow(replace(log, qpos=qpos), 0)[100].azimuth
-    assert turned - follow(log, 0)[100].azimuth == pytest.approx(90.0)
+    left = changed(log, quaternion=turned(np.pi / 2))
+    azimuth = [follow(one, 0)[100].azimuth for one in (log, left)]
+    assert azimuth[1] - azimuth[0] == pytest.approx(90.0)
 
 
 def reading(**changes):
@@ -306,7 +290,7 @@ def test_what_cannot_be_filmed_is_said_in_one_line(tmp_path, call, words):
 def elsewhere():
     """A log whose robot walked 0.2 m below the ground that the log keeps."""
     log = slide()
-    return replace(log, clearance=log.clearance + 0.2)
+    return changed(log, clearance=log.truth.clearance + 0.2)
 
 
 def no_video(folder):
@@ -351,7 +335,7 @@ else:
 )
 def test_without_opengl_one_line_says_what_to_install(environment):
     said = in_a_fresh_interpreter(**environment)
-    assert said.startswith("unavailable: no OpenGL to draw videos with (")
+    assert said.startswith("unavailable: videos need OpenGL (")
     assert said.endswith("apt-get install libegl1 libgl1")
     assert "\n" not in said
 

@@ -87,7 +87,7 @@ class Study(RobotOptions):
         parts = [
             table.part(
                 (amplitude, way.name),
-                f"{way.name} over {amplitude:g} m",
+                f"{way.name} at {amplitude:g} m",
                 partial(crossed, way, amplitude),
             )
             for amplitude in self.amplitudes

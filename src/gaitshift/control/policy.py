@@ -82,6 +82,11 @@ def shipped() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _SHIPPED.glob("*.onnx")))
 
 
+def record_file(gait: str) -> Path:
+    """The file that says how a shipped policy was trained: preset, seed, figures."""
+    return _SHIPPED / f"{gait}.json"
+
+
 def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
     """A shipped policy by the name of its gait, or any policy file, for this robot.
 

@@ -1,5 +1,8 @@
 """A machine as a picture: states as the feet seen from above, edges as arrows with their guards."""
 
+# matplotlib's own stubs leave **kwargs untyped:
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
+
 import math
 import textwrap
 from pathlib import Path

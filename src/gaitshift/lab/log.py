@@ -122,7 +122,11 @@ class Log(Batch):
         values["gaits"] = tuple(str(name) for name in np.atleast_1d(values["gaits"]))
         plain = {"sensed.has_heading": bool, "sensed.period": float}
         for name, kind in plain.items():
-            values[name] = kind(values[name])
+            if np.size(values[name]) != 1:
+                raise GaitshiftError(
+                    f"{path}: '{name}' must be one value, got the shape {np.shape(values[name])}"
+                )
+            values[name] = kind(np.ravel(values[name])[0])
         values = checked(path, values, {name: types[name] for name in values})
         records = {name: _record(name, made, values) for name, made in _RECORDS.items()}
         own = {name: value for name, value in values.items() if "." not in name}

@@ -37,9 +37,9 @@ def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) 
         GaitshiftError: an array of another shape or kind, numbers that are not finite, a time that
             does not rise at one rate.
     """
-    whole = {**values, **_shaped(path, values, declared)}
+    whole: dict[str, Any] = {**values, **_shaped(path, values, declared)}
     _check_numbers(path, whole)
-    _check_time(path, whole["sensed.time"])
+    _check_time(path, whole["sensed.time"], whole["sensed.period"])
     return whole
 
 
@@ -116,27 +116,33 @@ def _where(wrong: np.ndarray, name: str) -> str:
     return f" at entry {step}" + "".join(f" of robot {number}" for number in robot)
 
 
-def _check_time(path: Path, time: np.ndarray) -> None:
-    """Refuses a time that does not rise at one rate."""
+def _check_time(path: Path, time: np.ndarray, told: float) -> None:
+    """Refuses a time that does not rise at one rate, `told` as the time between two entries [s]."""
     apart = np.diff(time)
     if not apart.size:
         return
     standing = np.flatnonzero(apart <= 0.0)
     if standing.size:
         raise GaitshiftError(
-            f"{path}: 'time' must rise from entry to entry, got {time[standing[0] + 1]:.4g} s "
-            f"after {time[standing[0]]:.4g} s at entry {standing[0] + 1}"
+            f"{path}: 'sensed.time' must rise from entry to entry, got "
+            f"{time[standing[0] + 1]:.4g} s after {time[standing[0]]:.4g} s at entry "
+            f"{standing[0] + 1}"
         )
     period = float(apart[0])
     if not LEAST_PERIOD <= period <= MOST_PERIOD:
         raise GaitshiftError(
-            f"{path}: entries of 'time' must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s apart, got "
-            f"{period:.4g}; the unit is seconds"
+            f"{path}: entries of 'sensed.time' must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s "
+            f"apart, got {period:.4g}; the unit is seconds"
+        )
+    if not abs(told - period) <= RATE_TOLERANCE * period:
+        raise GaitshiftError(
+            f"{path}: 'sensed.period' must be the time between two entries, {period:.4g} s, got "
+            f"{told:.4g}"
         )
     changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
     if changed.size:
         at = changed[0]
         raise GaitshiftError(
-            f"{path}: entries of 'time' must be equally spaced, got {period:.4g} s at first and "
-            f"{apart[at]:.4g} s at entry {at + 1}"
+            f"{path}: entries of 'sensed.time' must be equally spaced, got {period:.4g} s at first "
+            f"and {apart[at]:.4g} s at entry {at + 1}"
         )

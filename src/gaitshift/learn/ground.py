@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gaitshift.learn.recipe import Recipe, Stage
+from gaitshift.learn.recipe import Stage
 from gaitshift.sim.terrain import Terrain, flat, perlin, slope, stairs
 
 FIELD = 20.0
@@ -15,15 +15,6 @@ FIRST_SHARE = 0.3
 
 RUNS = {"stair": (0.30, 0.50), "step": (1.0, 2.5)}
 """Shortest and longest tread [m]; ours: those of staircases, and room for strides in between."""
-
-
-def stage_at(recipe: Recipe, iteration: int) -> tuple[Stage, int]:
-    """The stage of an iteration and the iteration's number within it."""
-    for stage in recipe.stages:
-        if iteration < stage.iterations:
-            return stage, iteration
-        iteration -= stage.iterations
-    return recipe.stages[-1], recipe.stages[-1].iterations + iteration
 
 
 def draw_grounds(stage: Stage, within: int, seed: int) -> tuple[Terrain, ...]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.sim.env import EnvConfig
+from gaitshift.sim.env import Curriculum, EnvConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +76,7 @@ class Stage:
     """Largest push on the base [N]."""
     mixed_starts: float = 0.0
     """Share of the episodes that begin in the midst of a stride that is no gait's, as after a shift
-    from another gait (`GaitEnv.mixed_starts`); ours, the paper trains nothing for shifts."""
+    from another gait (`Curriculum.mixed_starts`); ours, the paper trains nothing for shifts."""
     swing_factor: float = 1.0
     """Factor on the swing heights that the gait asks for; ours: feet that swing 14 cm high, where
     10 cm is enough on level ground, do not catch on steps."""
@@ -227,18 +227,26 @@ class Recipe:
             left -= take
         return replace(self, stages=tuple(s for s in stages if s.iterations > 0))
 
-    def strictness(self, iteration: int) -> float:
-        """The environment's strictness at this iteration."""
-        return self.strict_share * _grown(iteration, self.strict_from, self.strict_until)
+    def stage_at(self, iteration: int) -> tuple[Stage, int]:
+        """The stage of an iteration and the iteration's number within it."""
+        for stage in self.stages:
+            if iteration < stage.iterations:
+                return stage, iteration
+            iteration -= stage.iterations
+        return self.stages[-1], self.stages[-1].iterations + iteration
 
-    def command_scale(self, iteration: int) -> float:
-        """Share of the gait's ranges that commands are drawn from at this iteration."""
-        return _grown(iteration, self.command_from, self.command_until)
-
-    def penalty_scale(self, iteration: int) -> float:
-        """The factor λ on all penalties at this iteration (paper III-D)."""
+    def curriculum(self, iteration: int) -> Curriculum:
+        """What is asked of robots at this iteration."""
+        stage, _ = self.stage_at(iteration)
+        strictness = _grown(iteration, self.strict_from, self.strict_until)
         first = self.penalty_start
-        return first + (1.0 - first) * _grown(iteration, 0, self.penalty_until)
+        return Curriculum(
+            strictness=self.strict_share * strictness,
+            swing_factor=stage.swing_factor,
+            command_scale=_grown(iteration, self.command_from, self.command_until),
+            penalty_scale=first + (1.0 - first) * _grown(iteration, 0, self.penalty_until),
+            mixed_starts=stage.mixed_starts,
+        )
 
     def settling(self, iteration: int) -> float:
         """The factor on `desired_kl` and `entropy` at this iteration."""
@@ -252,6 +260,17 @@ class Recipe:
         """Whether the actor of a checkpoint at this iteration is averaged into the policy."""
         last = self.stages[-1]
         return last.averaged > 0 and iteration >= self.iterations - last.averaged * last.iterations
+
+    @classmethod
+    def two_stage(cls) -> "Recipe":
+        """The recipe before the last stage was added: six of the shipped policies are by it.
+
+        The last 35 % of all iterations settle, and actors are averaged over the last 24 %.
+        """
+        rough, total = replace(_ROUGH, trace_factor=1.0), 350 + _ROUGH.iterations
+        settle, averaged = (share * total / _ROUGH.iterations for share in (0.35, 0.24))
+        last = replace(rough, settle=settle, averaged=averaged)
+        return cls(stages=(Stage(name="flat", iterations=350), last))
 
     @classmethod
     def paper(cls) -> "Recipe":
@@ -290,5 +309,5 @@ def _grown(iteration: int, start: float, end: float) -> float:
     return min(max((iteration - start) / (end - start), 0.0), 1.0)
 
 
-PRESETS = {"default": Recipe, "paper": Recipe.paper}
+PRESETS = {"default": Recipe, "two-stage": Recipe.two_stage, "paper": Recipe.paper}
 """Recipes by the name that `gaitshift train --preset` takes."""

@@ -20,7 +20,7 @@ from gaitshift import table
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
-from gaitshift.learn.ground import FIELD, draw_grounds, stage_at
+from gaitshift.learn.ground import FIELD, draw_grounds
 from gaitshift.learn.learner import Learner
 from gaitshift.learn.progress import last, trim
 from gaitshift.learn.recipe import Recipe
@@ -205,15 +205,12 @@ class Run:
     def iterate(self) -> Row:
         """One iteration, on the ground of its stage; gives the line that `train` writes down."""
         start = time.perf_counter()
-        stage, within = stage_at(self.recipe, self.iteration)
+        stage, within = self.recipe.stage_at(self.iteration)
         env = self.learner.env
         if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
             env.set_terrain(draw_grounds(stage, within, self.seed))
             env.push_at_most(stage.push)
-        env.swing_factor, env.mixed_starts = stage.swing_factor, stage.mixed_starts
-        env.strictness = self.recipe.strictness(self.iteration)
-        env.command_scale = self.recipe.command_scale(self.iteration)
-        env.penalty_scale = self.recipe.penalty_scale(self.iteration)
+        env.curriculum = self.recipe.curriculum(self.iteration)
         settling = self.recipe.settling(self.iteration)
         self.learner.aim(
             desired_kl=stage.kl_factor * settling,
@@ -263,7 +260,7 @@ class Run:
             why = " ".join(str(error).split())
             raise GaitshiftError(f"{path} does not fit {self.folder / CONFIG}: {why}") from error
         torch.set_rng_state(state["torch_rng"])
-        stage, within = stage_at(self.recipe, self.iteration)
+        stage, within = self.recipe.stage_at(self.iteration)
         drawn = within - within % stage.redraw_every
         self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed))
         self.learner.env.push_at_most(stage.push)

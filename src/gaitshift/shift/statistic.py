@@ -82,6 +82,7 @@ def check_positive(statistic: object, *names: str) -> None:
             raise GaitshiftError(f"{name} must be above 0, got {value:g}")
 
 
+@runtime_checkable
 class Starting(Protocol):
     """What has a state of robots that were not seen yet."""
 

@@ -80,8 +80,8 @@ ROBOTS = 30
 class Baseline:
     """PPO("MlpPolicy") and the flat environment of a recipe, with what it asks for growing alike.
 
-    Strictness and commands are, at each number of control steps, those that the recipe has there,
-    so that both learners are asked for the same.
+    The curriculum is, at each number of control steps, the one that the recipe has there, so that
+    both learners are asked for the same.
     """
 
     def __init__(
@@ -105,8 +105,7 @@ class Baseline:
     def advance(self) -> None:
         """One rollout and the updates from it."""
         iteration = self.steps // (self._recipe.robots * self._recipe.steps)
-        self._env.strictness = self._recipe.strictness(iteration)
-        self._env.command_scale = self._recipe.command_scale(iteration)
+        self._env.curriculum = self._recipe.curriculum(iteration)
         self._ppo.learn(self._ppo.n_steps * ROBOTS, reset_num_timesteps=False)
 
     def export(self) -> Path:

@@ -17,7 +17,8 @@ from gaitshift.lab.evaluation.evaluate import (
     field_length,
     run_policy,
 )
-from gaitshift.lab.gait_analysis import FIRST_GAITS, Check, checks
+from gaitshift.lab.gait_analysis import Check, checks
+from gaitshift.lab.gait_analysis.limits import FIRST, limits_of
 from gaitshift.lab.log import Log
 
 BATCH = 1_000_000
@@ -77,7 +78,7 @@ class Trial:
 
     def limit(self, gait: str) -> float | None:
         """The limit of its figure for a gait."""
-        return self.first if gait in FIRST_GAITS else self.others
+        return self.first if limits_of(gait) is FIRST else self.others
 
     def spec(self, length: float) -> str:
         """The ground at this length [m]: pieces in a row begin where robots have started level."""

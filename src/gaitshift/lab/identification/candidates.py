@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way
-from gaitshift.lab.identification.table import columns_of
+from gaitshift.lab.identification.log_files import columns_of
 from gaitshift.shift import STATISTICS, HeightDifference
 from gaitshift.shift.statistic import LEAKS
 from gaitshift.shift.statistics import Watched

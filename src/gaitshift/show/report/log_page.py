@@ -115,7 +115,8 @@ def stretches(log: Log, robot: int, description: Robot) -> list[Row]:
 
 def _judged(stretch: Log, machines: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Figures of a stretch, its time counted from its beginning."""
-    moved = replace(stretch, time=stretch.time - float(stretch.time[0]))
+    since = stretch.time - float(stretch.time[0])
+    moved = replace(stretch, sensed=replace(stretch.sensed, time=since))
     return measure(moved, machines, robot, warm_up=1.0)
 
 

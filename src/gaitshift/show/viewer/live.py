@@ -13,7 +13,7 @@ from gaitshift.lab.evaluation.demo import RUN_OUT, START, WIDTH, DemoConfig
 from gaitshift.lab.evaluation.rollout import Recorder, RolloutConfig, Walk, step_of
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
-from gaitshift.shift import GaitGraph, between, load_graph, tuned
+from gaitshift.shift import GaitGraph, Oracle, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.show.geometry import Frame
 from gaitshift.sim.terrain import from_spec
@@ -189,10 +189,16 @@ class LiveRun:
             self._recorder.add()
 
     def _switcher(self, config: LiveConfig) -> Autonomous | None:
-        missing = {*config.graph.gaits} - {*self._policies}
+        graph = config.graph
+        missing = {*graph.gaits} - {*self._policies}
         if missing:
             raise GaitshiftError(f"gait must be one with a policy, got '{min(missing)}'")
-        return Autonomous(config.graph, config.robots) if config.is_autonomous else None
+        if any(isinstance(one, Oracle) for one in graph.statistics.values()):
+            raise GaitshiftError(
+                f"condition must be one that robots can sense, got '{config.condition}', which "
+                "needs the truth about the ground"
+            )
+        return Autonomous(graph, config.robots) if config.is_autonomous else None
 
     @staticmethod
     def _rollout(config: LiveConfig) -> RolloutConfig:

@@ -50,7 +50,9 @@ def build_gaits(gui: Any, orders: Orders, live: LiveRun) -> None:
 
 def build_condition(gui: Any, orders: Orders, live: LiveRun) -> None:
     """Which condition, and its numbers."""
-    name = gui.add_dropdown("condition", _CONDITIONS, initial_value=live.config.condition)
+    shown = live.config.condition
+    offered = tuple(dict.fromkeys((*_CONDITIONS, shown)))  # it may be a file
+    name = gui.add_dropdown("condition", offered, initial_value=shown)
     now = numbers_of(live.config.graph)
     ranges = {
         "alpha": ("α [m]", 0.001, 0.3, 0.0002),

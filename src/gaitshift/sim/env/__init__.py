@@ -7,6 +7,7 @@ points by which installed packages registered their environments.)
 """
 
 from gaitshift.sim.env.config import EnvConfig as EnvConfig
+from gaitshift.sim.env.curriculum import Curriculum as Curriculum
 from gaitshift.sim.env.gait_env import GaitEnv as GaitEnv
 from gaitshift.sim.env.registry import register_gaits as register_gaits
 from gaitshift.sim.env.single import SingleGaitEnv as SingleGaitEnv

@@ -18,6 +18,7 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged
 from gaitshift.sim.env.commander import Commander
 from gaitshift.sim.env.config import EnvConfig
+from gaitshift.sim.env.curriculum import Curriculum
 from gaitshift.sim.env.mixed_start import MixedStart, mix
 from gaitshift.sim.env.swings import Swings
 from gaitshift.sim.reward import earned_bonus, walk_reward, with_bonus
@@ -59,18 +60,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         )
         """What robots observe, what their actions mean, how the machine moves on."""
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
-        self.strictness = 1.0
-        """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
-        depends on swing heights and punctuality, and factor on the price of chatter."""
-        self.swing_factor = 1.0
-        """Factor on the machine's swing heights now."""
-        self.command_scale = 1.0
-        """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
-        self.penalty_scale = 1.0
-        """The factor λ on all penalties now, 0 to 1 (paper III-D, where it is always 1)."""
-        self.mixed_starts = 0.0
-        """The share of episodes that begin in the midst of a stride that is no gait's (`mix`), of
-        those that begin while others go on."""
+        self.curriculum = Curriculum()
+        """What is asked for now; may be replaced between two steps."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
             -np.inf, np.inf, (self.walker.observation.size,), np.float32
@@ -107,8 +98,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._state, step = self.walker.step(before, action, sensed, command)
         left, waited = before.machine_state, before.steps_in_state
         on_time = self.machine.punctuality(left, waited, self.machine.dwell_for(command.stride))
+        asked = self.curriculum
         chatter, swing_share = self._swings.see(
-            left, step, sensed.contact, truth.clearance, self.swing_factor
+            left, step, sensed.contact, truth.clearance, asked.swing_factor
         )
         agreement = self.machine.agreement(step.state, sensed.contact)
         terms = walk_reward(
@@ -118,16 +110,16 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             command,
             stance=self._stance,
             agreement=agreement,
-            chatter=self.strictness * chatter,
+            chatter=asked.strictness * chatter,
             action_change=action - before.last_action,
-            penalty_scale=self.penalty_scale,
+            penalty_scale=asked.penalty_scale,
         )
         bonus = earned_bonus(
             self.config.reward,
             step.bonus,
             swing_share=swing_share,
             on_time=on_time,
-            strictness=self.strictness,
+            strictness=asked.strictness,
         )
         walk = np.sum(list(terms.values()), axis=0)
         reward = with_bonus(self.config.reward, walk, bonus)
@@ -201,7 +193,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._age[ids] = 0
         if start is not None:
             self._set_going(moving, start, yaw[np.isin(ids, moving)])
-        self._commander.restart(ids, yaw, self.command_scale)
+        self._commander.restart(ids, yaw, self.curriculum.command_scale)
         self._update_command()
 
     def _draw_mixed(
@@ -209,8 +201,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     ) -> tuple[Int[np.ndarray, " M"], MixedStart | None]:
         """Which of the robots that start anew do so on their way, and how."""
         moving = ids[:0]
-        if self.mixed_starts > 0 and len(ids) < self.num_envs:
-            moving = ids[self._rng.random(len(ids)) < self.mixed_starts]
+        share = self.curriculum.mixed_starts
+        if share > 0 and len(ids) < self.num_envs:
+            moving = ids[self._rng.random(len(ids)) < share]
         if moving.size == 0:
             return moving, None
         others = np.setdiff1d(np.arange(self.num_envs), ids)
@@ -268,7 +261,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         return all(terrain.is_flat for terrain in self.world.terrains)
 
     def _update_command(self) -> None:
-        self._commander.update(self._age, self.world.sensed.yaw, self.command_scale)
+        scale = self.curriculum.command_scale
+        self._commander.update(self._age, self.world.sensed.yaw, scale)
 
     def commands(self) -> dict[str, Any]:
         """What may be commanded: own value and range of forward speed and stride frequency."""
