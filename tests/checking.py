@@ -8,6 +8,7 @@ import functools
 import inspect
 import typing
 from dataclasses import is_dataclass
+from typing import Any, Self, get_args
 
 import jaxtyping
 from beartype import BeartypeConf, FrozenDict, beartype
@@ -62,7 +63,18 @@ def _sampled(plain, check):
         count = _calls[key] = _calls.get(key, 0) + 1
         if count > FIRST and count % EVERY:
             return plain(*args, **kwargs)
-        checked = checked or check(plain)
+        checked = checked or check(_of_any_class(plain))
         return checked(*args, **kwargs)
 
     return call
+
+
+def _of_any_class(function):
+    """The function with Any where it says Self: beartype sees methods without their class."""
+    hints = function.__annotations__
+    function.__annotations__ = {n: Any if _says_self(h) else h for n, h in hints.items()}
+    return function
+
+
+def _says_self(hint):
+    return hint is Self or any(map(_says_self, get_args(hint)))

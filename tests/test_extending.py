@@ -68,6 +68,88 @@ class GreetGait:
 '''
 
 
+LEAN = '''
+from dataclasses import dataclass
+
+import numpy as np
+
+from gaitshift.shift.statistic import SearchRange
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lean:
+    """Largest share of gravity along the body's axes."""
+
+    unit = ""
+    width = 1
+    needs = ()
+    search = SearchRange(low=0.01, high=1.0, note="how far the body leans")
+
+    def start(self, n):
+        return None
+
+    def step(self, state, sensed):
+        return None, np.abs(sensed.gravity_b[:, :2]).max(axis=1, keepdims=True)
+'''
+
+LEANING = """
+start = "trot"
+
+[statistic.body]
+kind = "lean"
+
+[[edge]]
+from = "trot"
+to = "bound"
+statistic = "body"
+alpha = 0.3
+beta = 2
+
+[[edge]]
+from = "bound"
+to = "trot"
+statistic = "body"
+when = "below"
+alpha = 0.3
+beta = 2
+"""
+
+STATUE = '''
+import numpy as np
+
+from gaitshift.control.repertoire import Repertoire
+from gaitshift.gait.gaits import load
+from gaitshift.robot.description import ANYMAL_B
+
+
+class Statue:
+    """Robots that stand."""
+
+    gains = "default"
+
+    def __init__(self, gaits, n, *, robot=None):
+        machines = tuple(load(gait) for gait in gaits)
+        self.n, self.robot, self.gait = n, robot or ANYMAL_B, np.zeros(n, dtype=int)
+        self.machine_state = np.zeros(n, dtype=int)
+        speeds, strides = np.full(len(machines), 0.5), np.full(len(machines), 2.0)
+        self.repertoire = Repertoire(
+            gaits=tuple(gaits), machines=machines, forward_speed=speeds, stride_frequency=strides
+        )
+
+    def act(self, sensed, command):
+        return np.tile(self.robot.stance_angles, (self.n, 1))
+
+    def see(self, sensed, command):
+        pass
+
+    def switch(self, ids, gait, sensed):
+        self.gait[ids] = self.repertoire.index(gait)
+
+    def value(self):
+        return None
+'''
+
+
 class Copy:
     """A copy of the package to add things to."""
 
@@ -146,6 +228,54 @@ print(json.dumps({
     assert facts["rough"] == [False, True]
     assert facts["height"] == pytest.approx(0.2 * 0.975)  # a sample before the drop
     assert facts["help"]
+
+
+def test_a_condition_is_one_file_and_one_line(copy):
+    """Graphs, robots and the search for its numbers know it."""
+    copy.add_file("shift/statistics/lean.py", LEAN)
+    registry = '    "oracle": "gaitshift.shift.statistics.oracle:Oracle",\n'
+    line = '    "lean": "gaitshift.shift.statistics.lean:Lean",'
+    copy.add_line("shift/statistics/__init__.py", registry, line)
+    (copy.folder / "leaning.toml").write_text(LEANING)
+    said = copy.python(
+        "-c",
+        """
+import numpy as np
+from gaitshift.lab.identification.candidates import candidates
+from gaitshift.robot.state import Proprioception, orientation_of
+from gaitshift.shift import load_graph
+
+graph = load_graph("leaning.toml")
+state = graph.begin(2)
+gravity = np.array([[0.6, 0.0, -0.8], [0.0, 0.1, -np.sqrt(0.99)]])  # one leans, one does not
+sensed = Proprioception(
+    contact=np.ones((2, 4), dtype=bool),
+    foot_position_b=np.zeros((2, 4, 3)),
+    orientation=orientation_of(gravity),
+)
+for _ in range(3):
+    state, decision = graph.step(state, sensed)
+print([graph.gaits[gait] for gait in state.gait], candidates(["lean"])[0].note)
+""",
+    )
+    assert said.strip() == "['bound', 'trot'] how far the body leans"
+
+
+def test_a_controller_is_one_file_and_one_line(copy):
+    """`--controller` takes it, here to be evaluated and to be recorded."""
+    copy.add_file("control/statue.py", STATUE)
+    registry = '    "cpg": "gaitshift.control.cpg:CpgController",\n'
+    copy.add_line(
+        "control/controllers.py", registry, '    "statue": "gaitshift.control.statue:Statue",'
+    )
+    few = ["--controller", "statue", "--seconds", "1", "--json"]
+    said = copy.python("-m", "gaitshift", "evaluate", "pronk", *few, "--episodes", "2")
+    assert json.loads(said)["survival"] == 1.0
+    where = ["--courses", "flat", "--robots", "2", "--out", "logs"]
+    said = copy.python("-m", "gaitshift", "record", "pronk", *few, *where)
+    (log,) = json.loads(said)["logs"]
+    assert log["robots"] == 2
+    assert log["fallen"] == 0
 
 
 def test_a_command_is_one_file_and_one_line(copy):

@@ -263,7 +263,7 @@ def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
     assert (row["alpha"], row["beta"], row["leak"], row["keeps_still"]) == (0.2, 1000.0, 0.0, None)
     assert (row["came"], row["detected"]) == (1, 0)
     readme = (tmp_path / "report" / "README.md").read_text()
-    assert "at the numbers that were given" in readme
+    assert "with the given α, β and leak" in readme
     assert "same logs" not in readme
 
 
@@ -274,7 +274,7 @@ def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
         (["nowhere.npz"], "no log file nowhere.npz"),
         (["README.md"], ".npz"),
         (["{log}", "--condition", "guess"], "got 'guess'"),
-        (["{log}", "--condition", "slip"], "lack signals"),
+        (["{log}", "--condition", "slip"], "lack the signals"),
         (["{smooth}"], "must contain rough ground"),
         (["{log}", "--alpha", "0.2"], "--beta"),
         (["{log}", "--leak", "1"], "--alpha and --beta"),

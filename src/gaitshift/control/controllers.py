@@ -1,11 +1,10 @@
 """Controllers by their names on the command line: one file each, and a line here."""
 
 from collections.abc import Sequence
+from pkgutil import resolve_name
 from typing import Protocol, runtime_checkable
 
 from gaitshift.control.controller import Controller
-from gaitshift.control.cpg import CpgController
-from gaitshift.control.driver import Driver
 from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.description import Robot
@@ -24,11 +23,12 @@ class ControllerMaker(Protocol):
         ...
 
 
-CONTROLLERS: dict[str, ControllerMaker] = {
-    "policy": Driver.load,
-    "cpg": CpgController,
+CONTROLLERS = {
+    "policy": "gaitshift.control.driver:Driver.load",
+    "cpg": "gaitshift.control.cpg:CpgController",
 }
-"""Trained policies; oscillators that learned nothing."""
+"""Makers of controllers: trained policies, and oscillators that learned nothing. A maker is
+imported when it is asked for."""
 
 
 def controller_maker(name: str) -> ControllerMaker:
@@ -39,4 +39,4 @@ def controller_maker(name: str) -> ControllerMaker:
     """
     if name not in CONTROLLERS:
         raise GaitshiftError(known_names("controller", name, tuple(CONTROLLERS)))
-    return CONTROLLERS[name]
+    return resolve_name(CONTROLLERS[name])

@@ -1,5 +1,6 @@
 """What shift conditions watch: one statistic a file, and its line here."""
 
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -8,29 +9,22 @@ from jaxtyping import Bool, Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift.statistic import AnyStatistic
-from gaitshift.shift.statistics.attitude import AttitudeVariance
-from gaitshift.shift.statistics.energy import CostOfTransport
-from gaitshift.shift.statistics.height_difference import HeightDifference
 from gaitshift.shift.statistics.oracle import Oracle
-from gaitshift.shift.statistics.plane import PlaneResidual
-from gaitshift.shift.statistics.slip import Slip
-from gaitshift.shift.statistics.speed import SpeedCommand
-from gaitshift.shift.statistics.surprise import TouchdownSurprise
-from gaitshift.shift.statistics.timing import ContactTiming
-from gaitshift.shift.statistics.value_drop import ValueDrop
 
-STATISTICS: dict[str, type[Any]] = {
-    "height_difference": HeightDifference,
-    "plane_residual": PlaneResidual,
-    "touchdown_surprise": TouchdownSurprise,
-    "attitude_variance": AttitudeVariance,
-    "contact_timing": ContactTiming,
-    "slip": Slip,
-    "cost_of_transport": CostOfTransport,
-    "value_drop": ValueDrop,
-    "speed": SpeedCommand,
-    "oracle": Oracle,
+_STATISTICS = {
+    "height_difference": "gaitshift.shift.statistics.height_difference:HeightDifference",
+    "plane_residual": "gaitshift.shift.statistics.plane:PlaneResidual",
+    "touchdown_surprise": "gaitshift.shift.statistics.surprise:TouchdownSurprise",
+    "attitude_variance": "gaitshift.shift.statistics.attitude:AttitudeVariance",
+    "contact_timing": "gaitshift.shift.statistics.timing:ContactTiming",
+    "slip": "gaitshift.shift.statistics.slip:Slip",
+    "cost_of_transport": "gaitshift.shift.statistics.energy:CostOfTransport",
+    "value_drop": "gaitshift.shift.statistics.value_drop:ValueDrop",
+    "speed": "gaitshift.shift.statistics.speed:SpeedCommand",
+    "oracle": "gaitshift.shift.statistics.oracle:Oracle",
 }
+
+STATISTICS: dict[str, type[Any]] = {name: resolve_name(of) for name, of in _STATISTICS.items()}
 """Statistics by the name that graph files and command lines call them."""
 
 Watched = AnyStatistic | Oracle
