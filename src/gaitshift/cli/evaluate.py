@@ -173,10 +173,6 @@ class Evaluate(RobotOption, EvaluationConfig):
             from gaitshift.show.plots.style import check_target
 
             check_target(self.plot)
-        if self.controller != "policy" and self.robot_file is not None:
-            raise GaitshiftError(
-                f"--robot-file is for policies, got --controller {self.controller}"
-            )
         if self.trials is None and not self.commands:
             return
         mode = "--commands" if self.commands else "--trials"
