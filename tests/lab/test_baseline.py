@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from gaitshift.lab.benchmark.ours import Ours
 
 from gaitshift.control import policy
 from gaitshift.gait import gaits
 from gaitshift.lab.benchmark.baseline import ROBOTS, Baseline, GaitVecEnv
+from gaitshift.lab.benchmark.trainer import GaitshiftTrainer
 from gaitshift.learn.recipe import Recipe, Stage
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
@@ -78,7 +78,7 @@ def test_both_learners_repeat_themselves_from_a_seed(tmp_path):
         return loaded(seen[:, : loaded.observation.size])
 
     for build in (
-        lambda seed: Ours(TROT, SMALL, seed, tmp_path, iterations=2),
+        lambda seed: GaitshiftTrainer(TROT, SMALL, seed, tmp_path, iterations=2),
         lambda seed: Baseline(TROT, SMALL, seed, tmp_path, rollout=32),
     ):
         first = acts(build(0))

@@ -9,7 +9,7 @@ import pytest
 
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import LabelledRun, auc, sources
+from gaitshift.lab.identification import LabelledRun, auc, log_files
 from gaitshift.lab.identification.candidates import CANDIDATES
 from gaitshift.lab.identification.classifier import RoughnessClassifier
 from gaitshift.lab.identification.judging import judge, replay_rules
@@ -318,7 +318,7 @@ def replayed_logs(monkeypatch, killed_at=None):
             if len(seen) == killed_at:
                 raise KeyboardInterrupt
             seen.append(path.stem)
-        return sources.recordings(paths, way)
+        return log_files.recordings(paths, way)
 
     monkeypatch.setattr("gaitshift.lab.identification.task.recordings", reading)
     return seen
