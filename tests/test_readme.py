@@ -18,7 +18,7 @@ def test_the_readmes_code_runs_and_its_condition_counts_nothing_on_level_feet():
     (block,) = (text for kind, text in fences(README) if kind == "python")
     names = {}
     exec(block, names)
-    assert names["state"].k.tolist() == [0.0]
+    assert names["state"].k.tolist() == [[0.0, 0.0]]
     assert names["decision"].fired.tolist() == [False]
 
 

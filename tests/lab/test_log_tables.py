@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification import log_files, passages
 from gaitshift.robot.legs import JOINTS, LEGS
@@ -51,8 +52,8 @@ def written(folder, data, ending="csv"):
 def test_a_table_becomes_passages_of_smooth_ground_and_the_rough_behind_it(
     tmp_path, monkeypatch, ending, batch
 ):
-    monkeypatch.setattr(log_files, "BATCH", batch)
-    monkeypatch.setattr(log_files, "BLOCK", 300 * batch)
+    monkeypatch.setattr(table, "BATCH", batch)
+    monkeypatch.setattr(table, "BLOCK", 300 * batch)
     read = list(passages(written(tmp_path, columns(), ending)))
     assert [len(one.time) for one in read] == [40, 20]
     assert read[0].rough[:, 0].tolist() == [False] * 20 + [True] * 20
@@ -118,8 +119,8 @@ def test_a_stretch_that_is_too_long_is_cut(tmp_path, monkeypatch):
 def test_for_the_way_to_flat_ground_a_table_is_cut_where_rough_ground_begins(
     tmp_path, monkeypatch, ending, batch
 ):
-    monkeypatch.setattr(log_files, "BATCH", batch)
-    monkeypatch.setattr(log_files, "BLOCK", 300 * batch)
+    monkeypatch.setattr(table, "BATCH", batch)
+    monkeypatch.setattr(table, "BLOCK", 300 * batch)
     read = list(passages(written(tmp_path, columns(), ending), "flat"))
     assert [len(one.time) for one in read] == [20, 40]
     assert not read[0].rough.any()
