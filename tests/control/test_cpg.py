@@ -176,9 +176,12 @@ def test_oscillators_are_judged_as_policies_are(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["trot", "--trials", "quick"], "--trials must not be given with --controller cpg"),
-        (["trot", "--commands"], "--commands must not be given with --controller cpg"),
-        (["trot", "--robot-file", "pony.toml"], "--robot-file must not be given"),
+        (["trot", "--trials", "quick"], "--trials is for policies, got --controller cpg"),
+        (["trot", "--commands"], "--commands is for policies, got --controller cpg"),
+        (
+            ["trot", "--robot-file", "pony.toml"],
+            "--robot-file is for policies, got --controller cpg",
+        ),
         (["gallop", "--log", "{folder}/new/log.npz"], "got 'gallop'"),
     ],
 )
