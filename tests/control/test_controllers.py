@@ -38,7 +38,7 @@ def test_an_unknown_controller_is_refused_with_those_there_are():
 
 def test_a_controller_that_is_registered_is_known_by_its_name(monkeypatch, capsys, tmp_path):
     """One line in CONTROLLERS, and commands walk robots by it."""
-    monkeypatch.setitem(CONTROLLERS, "statue", Statue)
+    monkeypatch.setitem(CONTROLLERS, "statue", f"{__name__}:Statue")
     made = controller_maker("statue")(["trot"], 2)
     assert isinstance(made, Statue)
     asked = ["trot", "--controller", "statue", "--episodes", "2", "--seconds", "1", "--json"]
