@@ -122,7 +122,8 @@ def stretches(log: Log, robot: int) -> list[Row]:
 
 def _judged(stretch: Log, machines: Mapping[str, Any]) -> dict[str, Any]:
     """Figures of a stretch, its time counted from its beginning."""
-    moved = replace(stretch, time=stretch.time - float(stretch.time[0]))
+    time = stretch.time - float(stretch.time[0])
+    moved = replace(stretch, sensed=replace(stretch.sensed, time=time))
     return measure(moved, machines, mass=robot_mass(stretch.robot), warm_up=1.0)
 
 
