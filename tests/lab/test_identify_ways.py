@@ -10,8 +10,6 @@ from matplotlib.image import imread
 from test_identify import (
     height_candidates,
     judged_by,
-    march,
-    table,
     time_to_fire,
     tuned_by,
     ways,
@@ -44,6 +42,7 @@ from gaitshift.shift import (
 )
 from gaitshift.shift import ways as edges_of
 from gaitshift.show.plots.identification import condition_map, roc_figure
+from marches import march, table
 
 
 def crossing(noise=0.04, *, seed=2, robots=3, name="crossing"):
@@ -268,7 +267,7 @@ def test_passages_are_scored_at_the_beta_that_tells_them_apart_best():
     (row,) = condition_rows([judged])
     assert (row["area"], row["area_beta"]) == (min(told), tuned.area_beta)
     assert condition_cells(row)[-1] == f"{tuned.area_beta:g}"
-    assert "told passages apart best on the logs that chose" in introduction([judged], True)[1]
+    assert "the β with the largest area on the logs for choosing" in introduction([judged], True)[1]
 
 
 @pytest.mark.parametrize(("beta", "is_told"), [(1793.0, True), (1801.0, False)])
@@ -342,7 +341,7 @@ def test_the_report_counts_chatter_with_the_shipped_way_back_or_there(way):
     assert (row["shifts"], row["chattered"]) == (count.sum(), (count > 2).sum())
     assert f"{row['chattered']} of 3" in course_cells(row)
     words = introduction([judged], True)[1]
-    assert f"the shipped way {'back' if way == 'rough' else 'there'} (touchdown_surprise's" in words
+    assert f"default graph's rule for the way {'back' if way == 'rough' else 'there'} (α" in words
 
 
 def test_a_rule_without_patience_chatters_on_rough_ground():

@@ -96,7 +96,9 @@ def test_rows_hold_the_signals_and_no_height_of_a_foot_that_has_not_touched(log,
     k, beta = (unpacked(series["values"]) for series in counter["series"])
     np.testing.assert_allclose(k, log.k[:, 1], rtol=1e-6)
     np.testing.assert_allclose(beta, log.threshold[:, 1], rtol=1e-6)
-    (heights,) = (row for title, row in rows.items() if title.startswith("height of each foot"))
+    (heights,) = (
+        row for title, row in rows.items() if title.startswith("height of the last touch")
+    )
     for leg, series in enumerate(heights["series"]):
         first = log.sensed.contact[:, 1, leg].argmax()
         values = unpacked(series["values"])
