@@ -13,7 +13,7 @@ from gaitshift.control import policy
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, strategies
 from gaitshift.lab.studies.crossing_table import COLUMNS, mean_of, row_of
-from gaitshift.show.plots.crossings import crossings_figure
+from gaitshift.show.plots.studies import crossings_figure
 from synthetic import changed
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")

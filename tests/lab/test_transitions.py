@@ -13,7 +13,7 @@ from gaitshift.lab.studies import Pair, run_pair
 from gaitshift.lab.studies.transition_table import COLUMNS
 from gaitshift.lab.studies.transitions import measure_shifts, running_mean
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.show.plots.transitions import transition_map
+from gaitshift.show.plots.studies import transition_map
 from gaitshift.table import read_typed
 from synthetic import changed
 

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from gaitshift.gait import gaits
-from gaitshift.show.viewer.charts import contact_svg, counter, foot_heights, machine_svg
-from gaitshift.show.viewer.tape import WINDOW, Tape
+from gaitshift.show.viewer.charts import (
+    WINDOW,
+    Tape,
+    contact_svg,
+    counter,
+    foot_heights,
+    machine_svg,
+)
 from walking import live_run, walk
 
 

@@ -13,8 +13,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.plots import contact_diagram, demo_figure, gait_colours, training_curves
-from gaitshift.show.plots.palette import INK, LEG_COLOURS
 from gaitshift.show.plots.signals import smoothed
+from gaitshift.show.plots.style import INK, LEG_COLOURS
 from gaitshift.sim.terrain import from_spec
 from synthetic import changed, log_of, turned
 

@@ -95,7 +95,7 @@ class Study(RobotOptions):
         ]
         run_missing(parts, progress=progress, say=say)
         rows = table.rows
-        from gaitshift.show.plots.crossings import crossings_figure  # matplotlib is slow to import
+        from gaitshift.show.plots.studies import crossings_figure  # matplotlib is slow to import
 
         crossings_figure(rows, self.out / PICTURE)
         command = shlex.join(["gaitshift", *sys.argv[1:]])

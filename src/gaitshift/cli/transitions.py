@@ -115,7 +115,7 @@ class Transitions(RobotOptions):
     def _draw(self, rows: list[dict[str, Any]]) -> None:
         """A map a ground, of all that the table has."""
         from gaitshift.lab.studies.transition_table import picture_of
-        from gaitshift.show.plots.transitions import transition_map  # matplotlib is slow to import
+        from gaitshift.show.plots.studies import transition_map  # matplotlib is slow to import
 
         for ground in dict.fromkeys(row["ground"] for row in rows):
             of = [row for row in rows if row["ground"] == ground]

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 
 from gaitshift.lab.log import Log
 from gaitshift.show.plots import rows
-from gaitshift.show.plots.palette import INK, PAPER, QUIET
 from gaitshift.show.plots.signals import (
     check_robot,
     fall_time,
@@ -21,7 +20,7 @@ from gaitshift.show.plots.signals import (
     period,
     shift_times,
 )
-from gaitshift.show.plots.style import check_target, house_style, save
+from gaitshift.show.plots.style import INK, PAPER, QUIET, check_target, house_style, save
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 
 from gaitshift.lab.log import Log
 from gaitshift.robot.legs import LEGS
-from gaitshift.show.plots.palette import GROUND, INK, LEG_COLOURS, PAPER, QUIET, gait_colours
 from gaitshift.show.plots.signals import (
     gait_at,
     gait_spans,
@@ -17,7 +16,17 @@ from gaitshift.show.plots.signals import (
     smoothed,
     spans,
 )
-from gaitshift.show.plots.style import DASHES, few_ticks, name_row
+from gaitshift.show.plots.style import (
+    DASHES,
+    GROUND,
+    INK,
+    LEG_COLOURS,
+    PAPER,
+    QUIET,
+    few_ticks,
+    gait_colours,
+    name_row,
+)
 
 _SPEED_SIGMA = 0.2
 """Of the window over the speed [s]: half a stride, so that the course is seen and not the steps."""

@@ -14,8 +14,16 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.show.plots.palette import INK, PALE, QUIET
-from gaitshift.show.plots.style import check_target, few_ticks, house_style, name_row, save
+from gaitshift.show.plots.style import (
+    INK,
+    PALE,
+    QUIET,
+    check_target,
+    few_ticks,
+    house_style,
+    name_row,
+    save,
+)
 from gaitshift.table import read
 
 COURSES = (

@@ -11,7 +11,6 @@ from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.geometry import Shape, frames_of, ground_grid, plane_corners
-from gaitshift.show.plots.palette import GROUND, LEG_COLOURS, gait_colours
 from gaitshift.show.plots.signals import (
     ground_below,
     ground_of,
@@ -19,6 +18,7 @@ from gaitshift.show.plots.signals import (
     period,
     shift_times,
 )
+from gaitshift.show.plots.style import GROUND, LEG_COLOURS, gait_colours
 from gaitshift.sim.terrain import Terrain
 
 EVERY = 2

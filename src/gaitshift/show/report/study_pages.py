@@ -19,7 +19,7 @@ from gaitshift.lab.identification.report import (
 )
 from gaitshift.lab.studies.transition_table import HEAD, row_cells
 from gaitshift.show.plots.identification import FALSE, LATEST, LINES, NOTICED, OTHERS, roc
-from gaitshift.show.plots.palette import gait_colours
+from gaitshift.show.plots.style import gait_colours
 from gaitshift.show.report.data import title_of
 from gaitshift.show.report.figures import Axis, Category, Curve, Said, curves, heat_map
 from gaitshift.show.report.page import facts_table, figure, table, write_page

@@ -10,13 +10,11 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.show.geometry import Frame
-from gaitshift.show.viewer.charts import Charts
+from gaitshift.show.viewer.charts import Charts, Tape
 from gaitshift.show.viewer.live import LiveConfig, LiveRun
-from gaitshift.show.viewer.orders import Orders
 from gaitshift.show.viewer.panels import build_condition, build_gaits, build_ground, build_push
 from gaitshift.show.viewer.scene import Scene
-from gaitshift.show.viewer.server import TICK, Clock
-from gaitshift.show.viewer.tape import Tape
+from gaitshift.show.viewer.server import TICK, Clock, Orders
 
 _CHARTS_EVERY = 6
 """Pictures between two of the charts."""

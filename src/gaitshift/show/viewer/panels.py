@@ -7,7 +7,7 @@ from typing import Any
 
 from gaitshift.shift import load_graph, numbers_of
 from gaitshift.show.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, LiveRun
-from gaitshift.show.viewer.orders import Orders
+from gaitshift.show.viewer.server import Orders
 
 _CONDITIONS = ("terrain", "height_difference", "paper")
 """Shipped graphs of two gaits that the page offers."""

@@ -12,11 +12,10 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.show.geometry import frames_of
 from gaitshift.show.plots.signals import check_robot, ground_of
-from gaitshift.show.viewer.charts import Charts
+from gaitshift.show.viewer.charts import WINDOW, Charts, Tape
 from gaitshift.show.viewer.live import MOST_ROBOTS
 from gaitshift.show.viewer.scene import Scene
 from gaitshift.show.viewer.server import TICK, Clock
-from gaitshift.show.viewer.tape import WINDOW, Tape
 
 _EVERY = round(TICK / CONTROL_PERIOD)
 """Entries of a log from picture to picture."""

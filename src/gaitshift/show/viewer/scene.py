@@ -10,7 +10,7 @@ from PIL import ImageColor
 
 from gaitshift.robot.description import Robot
 from gaitshift.show.geometry import Frame, Shape, ground_mesh, linear, plane_corners
-from gaitshift.show.plots.palette import gait_colours
+from gaitshift.show.plots.style import gait_colours
 from gaitshift.sim.terrain import Terrain
 
 _DARK = (70, 75, 82)
