@@ -1,4 +1,4 @@
-"""What a run of N robots left behind, step by step: the one format of `--log FILE.npz`."""
+"""The log of a run of N robots, step by step: the format of `--log FILE.npz`."""
 
 import zipfile
 import zlib
@@ -16,29 +16,29 @@ from gaitshift.lab.log_check import checked
 from gaitshift.robot.state import Batch, Privileged, Proprioception
 
 FORMAT_VERSION = 2
-"""Raised when an earlier file could be misread. 1 (gaitshift 0.1) held MuJoCo's qpos and qvel."""
+"""Increased when an earlier file could be misread. 1 (gaitshift 0.1) held MuJoCo's qpos, qvel."""
 
 _RECORDS: Mapping[str, type[Any]] = {"sensed": Proprioception, "truth": Privileged}
-"""Records that a log has; their arrays are named `sensed.contact` and so on in a file."""
+"""Records of a log; in a file their arrays are named `sensed.contact` and so on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Log(Batch):
-    """T control steps of N robots: what they sensed, the truth about them, and what was decided.
+    """T control steps of N robots: proprioception, privileged state, and decisions.
 
-    Time comes first, then the robot, then the leg or joint; `log[t]` is a step, and `log[a:b]` some
-    of the steps. Entry t is what was so after control step t: what the controllers saw before their
-    next action. Numbers may be kept in single precision: 4 µm at 50 m.
+    Axes are time, robot, then leg or joint; `log[t]` is a step, and `log[a:b]` some of the steps.
+    Entry t is the state after control step t, which the controllers saw before their next action.
+    Numbers may be in single precision, which resolves 4 µm at 50 m.
     """
 
     sensed: Proprioception
-    """What robots knew of themselves, and what they were commanded."""
+    """Proprioception and commands."""
     truth: Privileged
-    """What only the simulator knew."""
+    """State that only the simulator knows."""
     k: Float[np.ndarray, "*batch"]
     """The shift condition's counter, before a shift sets it back to 0 [counts]."""
     threshold: Float[np.ndarray, "*batch"]
-    """β (or the reverse rule's) that k is held against [counts]."""
+    """β of the rule that k belongs to, forward or reverse [counts]."""
     gait: Int[np.ndarray, "*batch"]
     """Index into `gaits` of the gait that acts next."""
     machine_state: Int[np.ndarray, "*batch"]
@@ -46,7 +46,7 @@ class Log(Batch):
     stance_shown: Bool[np.ndarray, "*batch"]
     """Whether the contacts are a stance set of that gait's machine."""
     fallen: Bool[np.ndarray, "*batch"]
-    """Whether the robot has fallen by now; it lies where it fell, and counts no more."""
+    """Whether the robot has fallen so far; a fallen robot stays down and no longer counts."""
     gaits: tuple[str, ...]
     """Names of the gaits."""
     robot: str
@@ -54,8 +54,8 @@ class Log(Batch):
     terrain: str
     """Spec of the ground."""
     terrain_height: Float[np.ndarray, "rows cols"]
-    """Heights of the ground, rows along +y, columns along +x [m]; the first one's where robots
-    stood on several."""
+    """Heights of the ground, rows along +y, columns along +x [m]; of several grounds, the
+    first."""
     terrain_size: Float[np.ndarray, " 2"]
     """Length along x and width along y of the ground [m]."""
     terrain_origin: Float[np.ndarray, " 2"]
@@ -108,7 +108,7 @@ class Log(Batch):
     def load(cls, path: Path) -> "Log":
         """Reads what `save` wrote.
 
-        Other arrays in the file are passed over.
+        Other arrays in the file are ignored.
 
         Raises:
             GaitshiftError: no such file, not an npz file, of an earlier format, or an array is
@@ -134,7 +134,7 @@ class Log(Batch):
 
 
 def _types() -> dict[str, Any]:
-    """The types of all that a file holds, by name, those of records with their prefix."""
+    """The types of all entries of a file by name; names of record fields have a prefix."""
     types: dict[str, Any] = {}
     for field in fields(Log):
         made = _RECORDS.get(field.name)
@@ -151,7 +151,7 @@ def _record(name: str, made: type[Any], values: Mapping[str, Any]) -> Any:
 
 
 def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries of a file that a log has."""
+    """The entries of a file that belong to a log."""
     try:
         with path.open("rb") as file:
             entries = np.load(file)

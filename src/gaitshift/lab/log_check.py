@@ -1,4 +1,4 @@
-"""What no robot can have left behind: the checks of a log file."""
+"""The checks of a log file: shapes, kinds, finite numbers, times."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,29 +9,29 @@ import numpy as np
 from gaitshift.errors import GaitshiftError
 
 _MAY_BE_NAN = ("sensed.value", "k", "threshold")
-"""Arrays of which anything may be expected where a robot lies; all others hold finite numbers."""
+"""Arrays that may hold NaN; all others hold finite numbers."""
 
 _FIRST = "sensed.contact"
-"""The array whose shape says how many steps and robots there are."""
+"""The array whose shape gives the number of steps and robots."""
 
 LEAST_PERIOD, MOST_PERIOD = 0.0005, 0.5
-"""Between two entries [s]; ours: no robot is controlled faster, and no step is seen slower, so what
-lies outside is no time in seconds."""
+"""Least and greatest time between two entries [s]; ours: no robot is controlled faster, and slower
+entries miss steps, so a value outside is not a time in seconds."""
 
 RATE_TOLERANCE = 0.05
-"""By how much of a period two entries may be nearer or further apart than the first two."""
+"""Largest deviation of the time between two entries from that of the first two [period]."""
 
 _HOLDS = {"b": "true and false", "f": "numbers", "i": "whole numbers"}
-"""What an array of this kind holds, in words."""
+"""Content of an array by its kind, for error messages."""
 
 
 def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) -> dict[str, Any]:
-    """What a log file holds, its arrays as they are declared, if a robot can have left it.
+    """The entries of a log file, checked and with the declared shapes and kinds.
 
     Args:
-        path: of the file, to name.
-        values: what it holds, by name.
-        declared: the types of the same names, as jaxtyping writes them.
+        path: of the file, for error messages.
+        values: its entries by name.
+        declared: the types of the same names, as jaxtyping annotations.
 
     Raises:
         GaitshiftError: an array of another shape or kind, numbers that are not finite, a time that
@@ -46,7 +46,7 @@ def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) 
 def _shaped(
     path: Path, values: Mapping[str, Any], types: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
-    """The arrays in the shapes and of the kinds that are declared."""
+    """The arrays with their declared shapes and kinds."""
     declared = {name: _declared(of) for name, of in types.items()}
     sizes, shaped = dict[str, int](), dict[str, np.ndarray]()
     for name in sorted((n for n, of in declared.items() if of is not None), key=_FIRST.__ne__):
@@ -73,7 +73,7 @@ def _shaped(
 
 
 def _declared(annotation: Any) -> tuple[tuple[str, ...], str] | None:
-    """Axes and kind of the arrays that a field takes; None where it takes none."""
+    """Axes and kind of the arrays of a field; None for a field without arrays."""
     of: Any = annotation if hasattr(annotation, "dim_str") else (*get_args(annotation), None)[0]
     if not hasattr(of, "dim_str"):
         return None
@@ -83,7 +83,7 @@ def _declared(annotation: Any) -> tuple[tuple[str, ...], str] | None:
 
 
 def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
-    """Refuses what no robot can have done."""
+    """Raises `GaitshiftError` for impossible values."""
     for name, value in values.items():
         if name in _MAY_BE_NAN or not isinstance(value, np.ndarray) or value.dtype.kind != "f":
             continue
@@ -109,15 +109,15 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
 
 
 def _where(wrong: np.ndarray, name: str) -> str:
-    """The first place where an array is wrong, in words."""
+    """The first place where an array is wrong, for error messages."""
     if name.startswith("terrain_"):
         return ""
     step, *robot = np.argwhere(wrong)[0][:2]
     return f" at entry {step}" + "".join(f" of robot {number}" for number in robot)
 
 
-def _check_time(path: Path, time: np.ndarray, told: float) -> None:
-    """Refuses a time that does not rise at one rate, `told` as the time between two entries [s]."""
+def _check_time(path: Path, time: np.ndarray, stated: float) -> None:
+    """Raises `GaitshiftError` unless the time rises at one rate, by `stated` [s] per entry."""
     apart = np.diff(time)
     if not apart.size:
         return
@@ -134,10 +134,10 @@ def _check_time(path: Path, time: np.ndarray, told: float) -> None:
             f"{path}: entries of 'sensed.time' must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s "
             f"apart, got {period:.4g}; the unit is seconds"
         )
-    if not abs(told - period) <= RATE_TOLERANCE * period:
+    if not abs(stated - period) <= RATE_TOLERANCE * period:
         raise GaitshiftError(
             f"{path}: 'sensed.period' must be the time between two entries, {period:.4g} s, got "
-            f"{told:.4g}"
+            f"{stated:.4g}"
         )
     changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
     if changed.size:

@@ -1,4 +1,4 @@
-"""Work in parts that goes on after a kill: parts whose result is on disk are not done again."""
+"""Work in parts that resumes after a kill: parts whose result is on disk are not repeated."""
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
@@ -11,7 +11,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.table import Columns, Row
 
 Report = Callable[[int, int], None]
-"""Takes the work done and the work in all."""
+"""Takes the work done and the total."""
 
 Progress = Callable[[str], AbstractContextManager[Report]]
 """Shows the progress of the part of this name."""
@@ -52,7 +52,7 @@ def run_missing(
 
 
 class ResumableTable:
-    """A CSV file that is written anew, whole or not at all, with each row that is added."""
+    """A CSV file that is rewritten atomically for each row that is added."""
 
     def __init__(
         self, path: Path, columns: Columns, *, key: Sequence[str], rows: Sequence[Row] = ()

@@ -1,4 +1,4 @@
-"""The tables of a run that grow by a row an iteration: read, cut back, and asked for the last."""
+"""The tables of a run that grow by a row an iteration: reads them, cuts them, finds a row."""
 
 from pathlib import Path
 from typing import Any
@@ -8,16 +8,16 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.table import Row
 
 _TEXTS = ("stage", "gait", "misses")
-"""Columns that hold words; all others hold numbers, yes or no, or nothing."""
+"""Columns that hold text; all others hold numbers or booleans, or are empty."""
 
 _WORDS = {"True": True, "False": False, "": None}
 
 
 def read(path: Path) -> list[dict[str, str]]:
-    """The rows of such a table, none if there is no file, without one that a kill cut short.
+    """The rows of such a table without a cut last row; no rows if there is no file.
 
     Raises:
-        GaitshiftError: a damaged row, or no such table.
+        GaitshiftError: a row is damaged, or the file is another table.
     """
     if not path.exists():
         return []
@@ -47,7 +47,7 @@ def trim(path: Path, iteration: int) -> None:
 
 
 def last(path: Path, iteration: int) -> Row:
-    """The last row up to an iteration, its values as they were when it was written; or nothing.
+    """The last row up to an iteration, its values of their original types; an empty row if none.
 
     Raises:
         GaitshiftError: as `read`.

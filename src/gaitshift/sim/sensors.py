@@ -1,4 +1,4 @@
-"""What robots sense of the truth: perfect sensors."""
+"""Perfect sensors: proprioception from the simulator's state."""
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -20,10 +20,10 @@ def sense(
     *,
     contact: Bool[np.ndarray, "N 4"],
 ) -> Proprioception:
-    """What robots know of themselves, without noise and without delay.
+    """Proprioception without noise and without delay.
 
     Args:
-        truth: what the simulator knows of the same instant.
+        truth: the privileged state at the same instant.
         rotation: of the bases, from body to world.
         qpos: MuJoCo's positions: m, quaternion, rad.
         qvel: MuJoCo's velocities: m/s in the world, rad/s in the body, rad/s of the joints.

@@ -18,7 +18,7 @@ from gaitshift.sim.terrain import Terrain, from_spec
 from gaitshift.sim.world import World
 
 RUN_OUT = 8.0
-"""Level metres behind the finish, for robots that wait there for the slower ones."""
+"""Metres of level ground behind the finish, where faster robots wait for slower ones."""
 
 WIDTH = 8.0
 """Width of a track [m]."""
@@ -33,7 +33,7 @@ _NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
 
 @dataclass(frozen=True, kw_only=True)
 class DemoConfig:
-    """What the demonstration shows."""
+    """Settings of the demonstration."""
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
     """The ground, piece by piece with lengths in metres; pieces as in `evaluate --terrain`."""
@@ -92,17 +92,17 @@ class DemoConfig:
 
     @property
     def shift_times(self) -> tuple[float, ...]:
-        """When the shifts of a schedule are due [s]."""
+        """Times of the scheduled shifts [s]."""
         return self.at or tuple(self.every * i for i in range(1, len(self.gaits)))
 
     @property
     def used(self) -> tuple[str, ...]:
-        """The gaits that appear, each once, the first first."""
+        """The gaits that appear, each once, in order of appearance."""
         return tuple(dict.fromkeys(self.gaits)) or self.ways.gaits
 
     @property
     def ways(self) -> GaitGraph:
-        """The gait graph that the robots shift by; `GaitshiftError` where it cannot be had."""
+        """The gait graph by which the robots shift; `GaitshiftError` where it cannot be built."""
         graph = load_graph(self.graph)
         gaits = {
             "flat": self.flat_gait or graph.gaits[0],
@@ -121,7 +121,7 @@ def run_demo(
 ) -> tuple[Log, list[dict[str, Any]]]:
     """Runs the demonstration: the log of all robots, and a summary for each.
 
-    `make` makes another controller than the one that the config names.
+    `make` makes the controller, in place of the one that the config names.
     """
     n = config.episodes
     rng = np.random.default_rng(config.seed)
@@ -148,9 +148,9 @@ def run_demo(
 
 
 def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
-    """What one robot did until it crossed `finish` [m] or the run ended.
+    """Summary of one robot until it crossed `finish` [m] or the run ended.
 
-    Survival, distance, mean speed, and every shift of gait.
+    It has survival, distance, mean speed, and every gait shift.
     """
     x = log.truth.base_position_w[:, robot, 0]
     crossed = np.flatnonzero(x >= finish)
@@ -194,7 +194,7 @@ def _finish(config: DemoConfig, ground: Terrain) -> float:
 
 
 def _seconds(config: DemoConfig, finish: float, speed: float) -> float:
-    """Long enough for a robot at two thirds of the commanded speed [m/s]."""
+    """Time that a robot needs at two thirds of the commanded speed `speed` [m/s]."""
     if config.gaits:
         return config.shift_times[-1] + config.every
     return 1.5 * (finish - START) / speed

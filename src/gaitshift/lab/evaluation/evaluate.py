@@ -1,4 +1,4 @@
-"""Judges one policy, or another controller: many robots at once on a ground given by its spec."""
+"""Evaluates a policy or another controller: many robots at once on a ground given by its spec."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from gaitshift.sim.terrain import Terrain, from_spec
 from gaitshift.sim.world import PushConfig, World
 
 FIELDS = 8
-"""Different grounds that the robots share where the ground is random."""
+"""Number of different grounds among which robots are divided where the ground is random."""
 
 FIELD_WIDTH = 12.0
 """[m]"""
@@ -28,13 +28,13 @@ RUN_UP = 2.0
 """Metres of ground behind the start."""
 
 MARGIN, LEAST_MARGIN = 0.25, 1.0
-"""Ground beyond what robots are asked for: a share of it, and so many metres at least; ours: down a
-slope of 10° shipped policies come 11 % further than they are asked to."""
+"""Ground beyond the commanded distance: a share of that distance, and the least length [m]; ours:
+down a slope of 10° shipped policies walk 11 % further than commanded."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationConfig:
-    """What a policy is put through."""
+    """Settings of an evaluation."""
 
     terrain: str = "flat"
     """Spec of the ground: one piece, or a track of them (`sim.terrain.spec_help`)."""
@@ -84,7 +84,7 @@ def evaluate_controller(
     config: EvaluationConfig,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[dict[str, Any], Log]:
-    """Runs robots that are all in one gait, and measures them by that gait's own machine."""
+    """Runs robots that are all in one gait, and measures them with that gait's machine."""
     log = run_controller(controller, config, report=report)
     known = controller.repertoire
     machines = dict(zip(known.gaits, known.machines, strict=True))
@@ -99,9 +99,9 @@ def run_policy(
     values: bool = False,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
-    """Runs the deterministic policy; ends early when nobody is on the way to `finish_x` [m].
+    """Runs the deterministic policy; ends early when no robot still walks towards `finish_x` [m].
 
-    With `values` the log keeps what the policy's critic expects.
+    With `values` the log keeps the values of the policy's critic.
     """
     driver = _driver(policy, config)
     return run_controller(driver, config, finish_x=finish_x, values=values, report=report)
@@ -140,15 +140,15 @@ def run_controller(
 
 
 def field_length(speed: float, seconds: float) -> float:
-    """Length of ground [m] for robots at a speed [m/s]: a quarter more than they are asked for."""
+    """Length of ground [m] for robots at a speed [m/s]: a quarter more than commanded."""
     return 2 * RUN_UP + (1 + MARGIN) * speed * seconds
 
 
 def starts(controller: Controller, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-    """Where its robots begin [m].
+    """Starting points of its robots [m].
 
-    Spread over the width, so that robots on one field do not walk over the same ground, and over a
-    stride, so that they meet an edge at all instants of it.
+    They are spread over the width, so that robots on one field do not walk over the same ground,
+    and over a stride along x, so that robots reach an edge at all phases of the stride.
     """
     n = controller.n
     command = controller.repertoire.own_command(controller.gait)
@@ -160,13 +160,13 @@ def starts(controller: Controller, rng: np.random.Generator) -> Float[np.ndarray
 
 
 def grounds_of(terrain: str, *, seed: int, speed: float, seconds: float) -> list[Terrain]:
-    """The grounds that robots share: one where all seeds give the same, else `FIELDS`.
+    """The grounds for all robots: one where the ground is not random, else `FIELDS`.
 
     They begin `RUN_UP` behind the start, and are long enough for a speed [m/s] and time [s].
 
     Raises:
-        GaitshiftError: a spec with a length of its own that is too short for them, on ground that
-            is not flat: beyond its end there is nothing to stand on. Flat ground has no end.
+        GaitshiftError: the spec has its own length, which is too short, and the ground is not flat.
+            There is no ground beyond its end, while flat ground has no end.
     """
     length = field_length(speed, seconds)
     grounds: list[Terrain] = []
@@ -203,11 +203,11 @@ VERDICT_FIGURES = (
 
 
 def flat_verdict(policy: Policy) -> dict[str, Any]:
-    """The verdict on a policy on flat ground, at its own speed and stride frequency.
+    """The verdict on a policy on flat ground, at its nominal speed and stride frequency.
 
-    `gait` is the name by the contacts alone, `clean` whether it is the right one with all limits
-    kept, `misses` the figures that miss theirs with the worst foot, parted by "; ". The others are
-    as `gait_analysis.measure` defines them.
+    `gait` is the name by the contacts alone. `clean` is true if that name is the policy's gait and
+    all limits are met. `misses` lists the figures that miss their limits, with the worst foot,
+    separated by "; ". The other figures are defined in `gait_analysis.measure`.
     """
     figures, _ = evaluate(
         policy, EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS)

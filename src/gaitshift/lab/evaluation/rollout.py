@@ -45,7 +45,7 @@ OVER_THE_EDGE = 0.5
 
 
 class Walk:
-    """N robots on their way along x, a control step at a time."""
+    """N robots that walk along x, one control step at a time."""
 
     def __init__(
         self,
@@ -57,10 +57,10 @@ class Walk:
         rng: np.random.Generator,
         switcher: Switcher | None = None,
     ) -> None:
-        """Sets all robots of `world` down at `start_xy` [m], each to walk on its own line."""
+        """Places all robots of `world` at `start_xy` [m]; each walks along its own line."""
         self.world, self.controller, self.switcher = world, controller, switcher
         self.config = config
-        """May be replaced between two steps, to ask for another speed."""
+        """May be replaced between two steps, to command another speed."""
         n = world.n
         noise = rng.uniform(-config.joint_noise, config.joint_noise, (n, 12))
         self._stance = controller.robot.stance_angles
@@ -68,15 +68,15 @@ class Walk:
         self._pusher = Pusher(config.push, n, rng)
         self._start_y = start_xy[:, 1]
         self.fallen: Bool[np.ndarray, " N"] = np.zeros(n, dtype=bool)
-        """Who has fallen by now."""
+        """Which robots have fallen so far."""
         self.steps = 0
         """Control steps so far."""
         self.decision: Decision | None = None
-        """What the switcher saw in the last step."""
+        """The switcher's decision in the last step."""
         self.wanted = self._command()
-        """The command in the last step; the speed asked for is trimmed about it."""
+        """The command in the last step, before the speed loop's trim."""
         self.sensed = world.sensed
-        """What robots sensed in the last step, with the time and what was wanted of them."""
+        """Proprioception in the last step, with the time and the command."""
         self._asked = self.wanted
         self._speed_state = config.speed_loop.start(n)
 
@@ -90,9 +90,9 @@ class Walk:
         see: Callable[[], None] = lambda: None,
         force_w: Float[np.ndarray, "N 3"] | float = 0.0,
     ) -> None:
-        """One control step; `see` is called at its end, before the next command is made.
+        """One control step; `see` is called at its end, before the next command is computed.
 
-        `force_w` [N] acts on the bases beside the pushes of the config.
+        `force_w` [N] acts on the bases in addition to the pushes of the config.
         """
         world, controller = self.world, self.controller
         target = controller.act(world.sensed, self._asked)
@@ -146,7 +146,7 @@ def rollout(
     """Runs all robots of `world` along x from `start_xy` [m], each on its own line.
 
     The run ends early when every robot has fallen or passed `finish_x` [m]. `report` is called with
-    the steps done and the steps in all.
+    the number of steps done and the total.
     """
     walk = Walk(world, controller, config, start_xy=start_xy, rng=rng, switcher=switcher)
     recorder = Recorder(walk)
@@ -161,7 +161,7 @@ def rollout(
 
 
 class Recorder:
-    """Collects what a `Log` of a walk is made of, in single precision: 45 kB a robot's second."""
+    """Collects the steps of a walk's `Log` in single precision: 45 kB per robot and second."""
 
     def __init__(self, walk: Walk) -> None:
         self._walk = walk
@@ -169,21 +169,21 @@ class Recorder:
 
     @property
     def steps(self) -> int:
-        """Steps that it holds."""
+        """Number of recorded steps."""
         return len(self._steps)
 
     def add(self) -> None:
-        """Takes in the step that ended."""
+        """Records the step that ended."""
         self._steps.append(_single(step_of(self._walk)))
 
     def log(self) -> Log:
-        """All of it; the recorder is empty then."""
+        """The log of all recorded steps; the recorder is empty afterwards."""
         steps, self._steps = self._steps, []
         return Log.stack(steps)
 
 
 def step_of(walk: Walk) -> Log:
-    """The step of a walk that ended last, as an entry of a log."""
+    """The last step of a walk, as an entry of a log."""
     controller, world, decision = walk.controller, walk.world, walk.decision
     terrain, nothing = world.terrains[0], np.zeros(world.n)
     return Log(
@@ -205,5 +205,5 @@ def step_of(walk: Walk) -> Log:
 
 
 def _single(log: Log) -> Log:
-    """A step with what robots sensed and the truth in single precision."""
+    """A step with its proprioception and privileged state in single precision."""
     return replace(log, sensed=log.sensed.as_type(np.float32), truth=log.truth.as_type(np.float32))

@@ -1,4 +1,4 @@
-"""The product S × U as a `gymnasium.vector.VectorEnv`, and the ids by which Gymnasium knows it.
+"""The product S × U as a `gymnasium.vector.VectorEnv`, and its Gymnasium ids.
 
 `gymnasium.make_vec("gaitshift.sim.env:gaitshift/trot-v0", num_envs=64)` works for every gait
 after `import gymnasium` alone, and so does `gymnasium.make`: Gymnasium imports the module before

@@ -1,4 +1,4 @@
-"""How much is asked of robots in training now."""
+"""The present difficulty of training."""
 
 from dataclasses import dataclass
 
@@ -7,24 +7,24 @@ from gaitshift.errors import GaitshiftError
 
 @dataclass(frozen=True, kw_only=True)
 class Curriculum:
-    """What `GaitEnv` asks for at one time of a training; by default everything, as in a trial.
+    """Difficulty of `GaitEnv` at one time of a training; by default full, as in a trial.
 
     Raises:
         GaitshiftError: a share is not in 0 to 1, or the factor on swing heights is not above 0.
     """
 
     strictness: float = 1.0
-    """How much of what only a clean gait can give is asked for, 0 to 1: how far the bonus depends
-    on swing heights and punctuality, and factor on the price of chatter."""
+    """How strictly a clean gait is demanded, 0 to 1: how far the bonus depends on swing heights and
+    punctuality, and the factor on the chatter penalty."""
     swing_factor: float = 1.0
     """Factor on the machine's swing heights."""
     command_scale: float = 1.0
-    """The share of the gait's ranges that commands are drawn from, 0 to 1."""
+    """Share of the gait's ranges from which commands are drawn, 0 to 1."""
     penalty_scale: float = 1.0
     """The factor λ on all penalties, 0 to 1 (paper III-D, where it is always 1)."""
     mixed_starts: float = 0.0
-    """The share of episodes that begin in the midst of a stride that is no gait's
-    (`gaitshift.sim.env.mixed_start`), of those that begin while others go on, 0 to 1."""
+    """Share of the restarts during a step that begin mid-stride with legs out of phase
+    (`gaitshift.sim.env.mixed_start`), 0 to 1."""
 
     def __post_init__(self) -> None:
         for name in ("strictness", "command_scale", "penalty_scale", "mixed_starts"):

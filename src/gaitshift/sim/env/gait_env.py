@@ -1,4 +1,4 @@
-"""The environment: one control step, told as the paper tells it."""
+"""The environment: a control step in the order of the paper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -31,12 +31,12 @@ Observations = Float32[np.ndarray, "N D"]
 class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
 
-    An episode ends when the body touches the ground or the machine accepts, and is cut after
+    An episode ends when the body touches the ground or the machine accepts, and is truncated after
     `episode_steps` or at the border of the terrain. Robots restart in the same step
     (`AutoresetMode.SAME_STEP`); the observation that ended an episode is in `info["final_obs"]`,
-    where `info["_final_obs"]` holds.
-    `info["reward_terms"]` has each weighted term of R_walk, `info["bonus"]` what the machine added,
-    `info["changed"]` says where it changed its state.
+    where `info["_final_obs"]` is true. `info["reward_terms"]` has each weighted term of R_walk,
+    `info["bonus"]` the machine's bonus, and `info["changed"]` whether the machine changed its
+    state.
     """
 
     def __init__(
@@ -58,10 +58,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             observation=Observation(machine, robot.stance, self.config.observed),
             action_scale=robot.action_scale,
         )
-        """What robots observe, what their actions mean, how the machine moves on."""
+        """Observation, meaning of actions, and steps of the machine."""
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
         self.curriculum = Curriculum()
-        """What is asked for now; may be replaced between two steps."""
+        """The present difficulty; may be replaced between two steps."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
             -np.inf, np.inf, (self.walker.observation.size,), np.float32
@@ -75,7 +75,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Starts every episode anew. The same seed gives the same bits ever after."""
+        """Restarts every episode. All later steps are the same, to the bit, for the same seed."""
         if seed is not None:
             self._start(np.random.default_rng(seed))
         self._restart(np.arange(self.num_envs))
@@ -138,9 +138,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         return observation, reward, terminated, truncated, info
 
     def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
-        """Exchanges the ground under the robots, which go on as they moved.
+        """Replaces the ground under the robots, which keep their motion.
 
-        Several grounds are shared out as in `World`; they cover the same rectangle.
+        Robots are divided among several grounds as in `World`; all cover the same rectangle.
         """
         self.world.set_terrain(terrain)
 
@@ -150,7 +150,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._pusher = Pusher(self.config.push, self.num_envs, self._rng)
 
     def spread_ages(self) -> None:
-        """Draws the present age of every episode, so that not all are cut in the same step."""
+        """Draws the age of every episode, so that they are truncated at different times."""
         self._age = self._rng.integers(0, self.config.episode_steps, self.num_envs)
 
     def _start(self, rng: np.random.Generator) -> None:
@@ -199,7 +199,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def _draw_mixed(
         self, ids: Int[np.ndarray, " K"]
     ) -> tuple[Int[np.ndarray, " M"], MixedStart | None]:
-        """Which of the robots that start anew do so on their way, and how."""
+        """Which of the restarting robots start in mid-stride, and their states."""
         moving = ids[:0]
         share = self.curriculum.mixed_starts
         if share > 0 and len(ids) < self.num_envs:
@@ -219,7 +219,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def _set_going(
         self, ids: Int[np.ndarray, " M"], start: MixedStart, yaw: Float[np.ndarray, " M"]
     ) -> None:
-        """Robots that stand at their starting points go on as if they had been on their way."""
+        """Puts robots at their starting points into these states in mid-stride."""
         turn = yaw - start.yaw
         c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
         self.world.place(
@@ -257,7 +257,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     @property
     def _is_level(self) -> bool:
-        """Whether no robot's ground has a border: level ground goes on for ever."""
+        """Whether the ground of all robots is level, and so has no border."""
         return all(terrain.is_flat for terrain in self.world.terrains)
 
     def _update_command(self) -> None:
@@ -265,7 +265,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._commander.update(self._age, self.world.sensed.yaw, scale)
 
     def commands(self) -> dict[str, Any]:
-        """What may be commanded: own value and range of forward speed and stride frequency."""
+        """Nominal value and range of the forward-speed and stride-frequency commands."""
         return self._commander.ranges()
 
     def _observation(self) -> Observations:

@@ -1,4 +1,4 @@
-"""An episode that begins in the midst of a stride that is no gait's: legs of several robots."""
+"""Episodes that start mid-stride with legs out of phase: each leg is copied from another robot."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MixedStart:
-    """K robots on their way."""
+    """State of K robots in mid-stride."""
 
     joint_position: Float[np.ndarray, "K 12"]
     """[rad]"""
@@ -26,9 +26,9 @@ class MixedStart:
     yaw: Float[np.ndarray, " K"]
     """The heading [rad]."""
     last_action: Float[np.ndarray, "K 12"]
-    """Of the robots that the legs are taken from."""
+    """Of the robots from which the legs are copied."""
     touch_height: Float[np.ndarray, "K 4"]
-    """At which those feet last touched, from the base [m]."""
+    """Height above the base at which those feet last touched [m]."""
     contact: Bool[np.ndarray, "K 4"]
     """Which of those feet are down."""
 
@@ -42,18 +42,18 @@ def mix(
     count: int,
     rng: np.random.Generator,
 ) -> MixedStart:
-    """Puts robots together: the base of one that is on its way, and each leg of another.
+    """Combines the base of one walking robot with each leg of another.
 
-    Any gait is one relation between the phases of four legs, so such starts hold what a robot finds
-    whose gait was changed in the midst of a stride, whatever the gait before.
+    A gait is a relation between the phases of the four legs. Legs with random phases therefore
+    cover the states after a shift in mid-stride from any other gait.
 
     Args:
-        sensed: what all robots sense at this instant.
-        truth: what the simulator knows of it.
-        state: where all robots are in their gait.
-        among: robots that may be taken from.
-        count: how many to put together.
-        rng: draws whom.
+        sensed: proprioception of all robots at this instant.
+        truth: privileged state at the same instant.
+        state: gait state of all robots.
+        among: robots that may be copied from.
+        count: number of states to make.
+        rng: draws the robots.
     """
     base, leg = rng.choice(among, count), rng.choice(among, (count, 4))
     of_leg = (leg, np.arange(4))

@@ -1,4 +1,4 @@
-"""What becomes of each foot between the moment the machine lifts it and its touchdown."""
+"""The swing of each foot, from the change of state that lifts it to its touchdown."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -7,9 +7,9 @@ from gaitshift.gait import RewardMachine, Step
 
 
 class Swings:
-    """The swings of N robots' feet: how high they went, and touchdowns out of place.
+    """The swings of N robots' feet: their heights, and touchdowns out of place.
 
-    At the start of an episode every foot may land once, and is taken for high enough.
+    At the start of an episode every foot may land once, and its swing counts as high enough.
     """
 
     def __init__(self, machine: RewardMachine, n: int) -> None:
@@ -35,13 +35,13 @@ class Swings:
     ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         """Number of touchdowns out of place, and share of the swing height that was reached.
 
-        In place is one touchdown after the machine has lifted the foot, in a state that has it in
-        its stance or in the state before. The share is that of the edge taken, 1 where there is
-        none.
+        A touchdown is in place if it is the first since the machine lifted the foot, and if the
+        state or the next one has the foot in its stance. The share is that of the edge taken, 1
+        without an edge.
 
         Args:
-            left: state in which the machine was.
-            step: what its step did.
+            left: state of the machine before the step.
+            step: result of the machine's step.
             contact: which feet are down after the step.
             clearance: of the feet over the ground [m].
             factor: on the machine's swing heights.

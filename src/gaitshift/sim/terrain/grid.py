@@ -1,4 +1,4 @@
-"""The sample points of a field that is still to be made."""
+"""The sample points of a field."""
 
 from dataclasses import dataclass
 from math import ceil

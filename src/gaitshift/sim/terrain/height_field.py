@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float, Float32
 from gaitshift.errors import GaitshiftError
 
 _FLAT_ELEVATION = 0.01
-"""Scale of a field whose samples are all 0 [m]: it moves nothing, but MuJoCo wants it positive."""
+"""Scale of a field whose samples are all 0 [m]: without effect, but MuJoCo needs it positive."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class Terrain:
     origin: tuple[float, float]
     """World x and y of sample [0, 0], the corner of smallest x and y [m]."""
     name: str
-    """The spec it was made of, for logs; arguments away from their defaults are not told."""
+    """The spec it was made from, for logs; it lacks arguments that differ from their defaults."""
     sections: tuple[Section, ...] = ()
     """The pieces along x, in order and without gaps; left empty: one, the whole field."""
 
@@ -87,8 +87,8 @@ class Terrain:
     def height_at(self, xy: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch"]:
         """Height below points `xy` [m], world frame, of the surface that MuJoCo collides with.
 
-        Outside the field the height of the nearest point of the border is given, where MuJoCo has
-        no ground. A point that is not a number has no height: NaN.
+        Outside the field, where MuJoCo has no ground, it is the height of the nearest point of the
+        border. The height of a NaN point is NaN.
         """
         near, middle, far, u, v = self._triangle(xy)
         # From the corner along the grid as far as the larger of u, v, then along the other axis.
@@ -135,7 +135,7 @@ class Terrain:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UnitField:
-    """The numbers that MuJoCo's `<hfield>` and the geom that shows it are made of."""
+    """The numbers of MuJoCo's `<hfield>` and of its geom."""
 
     data: Float32[np.ndarray, "rows cols"]
     """Samples from 0 (lowest) to 1 (highest), as `hfield_data` holds them; all 0 when flat.
@@ -154,8 +154,8 @@ def to_unit_interval(terrain: Terrain, *, base: float = 0.5) -> UnitField:
     float32 rounds samples to within 3e-8 of the relief (highest minus lowest sample), so that
     MuJoCo's surface and `Terrain.height_at` agree to 1e-6 m on any relief up to 30 m.
 
-    The base's default is ours: thick against the few millimetres a foot sinks in, so that a contact
-    never resolves downwards.
+    The default of `base` is ours: much thicker than the few millimetres by which a foot sinks in,
+    so that a contact never pushes a foot downwards.
     """
     lowest = float(terrain.height.min())
     relief = float(terrain.height.max()) - lowest

@@ -9,24 +9,24 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.height_field import Terrain
 
 Seed = int | np.random.Generator
-"""What a random ground is drawn from."""
+"""Seed of a random ground."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """A named number in a closed range; it says itself what would have been right."""
+    """A named number in a closed range, with an error message for values outside."""
 
     name: str
-    """What the number is, as it stands in error lines."""
+    """Its name in error messages."""
     unit: str
-    """Its unit, as it stands in error lines; empty for a count or a ratio."""
+    """Its unit in error messages; empty for a count or a ratio."""
     low: float
-    """The smallest value taken, in `unit`."""
+    """The smallest allowed value, in `unit`."""
     high: float
-    """The largest value taken, in `unit`."""
+    """The largest allowed value, in `unit`."""
 
     def check(self, value: float) -> float:
-        """Value itself; `GaitshiftError` where it is outside the range or not a number."""
+        """The value; `GaitshiftError` where it is outside the range or not a number."""
         if not self.low <= value <= self.high:
             raise GaitshiftError(f"{self.name} must be {self.range}, got {value:g}")
         return value
@@ -55,8 +55,8 @@ class Kind:
     make: Callable[[float, Seed, float, float, float], Terrain]
     """Makes it from number, seed, length, width and cell [m]; some need no number or no seed."""
     rough_from: float | None = None
-    """Least number from which it counts as rough ground, the truth that shift conditions are judged
-    by; None: it never does."""
+    """Least number at which it counts as rough ground, the label by which shift conditions are
+    judged; None: it never does."""
 
     @property
     def usage(self) -> str:

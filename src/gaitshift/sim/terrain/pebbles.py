@@ -31,13 +31,13 @@ def pebbles(
 ) -> Terrain:
     """Round bumps on level ground at z = 0, the highest sample exactly `height` [m].
 
-    `density` [1/m²] times the area, rounded, but at least one, is their number; their places are
-    even over the field, their diameters even between the two of `diameter` [m]. A bump of radius R
-    has the profile (1 − r²/R²)²; where two overlap the higher counts. The defaults are ours: flat
-    stones a little wider than a foot, on 7 % of the ground.
+    Their number is `density` [1/m²] times the area, rounded, but at least one. Their places are
+    uniform over the field, their diameters uniform between the two of `diameter` [m]. A bump of
+    radius R has the profile (1 − r²/R²)²; where two overlap the higher counts. The defaults are
+    ours: flat stones a little wider than a foot, on 7 % of the ground.
 
     `GaitshiftError` where a number is out of range, or `cell` is longer than half of the smallest
-    diameter: a bump between the samples would be lost.
+    diameter, because a bump between the samples would be lost.
     """
     _HEIGHT.check(height)
     _DENSITY.check(density)

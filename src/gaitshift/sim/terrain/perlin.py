@@ -35,8 +35,8 @@ def perlin(
     The sum of `octaves` layers of Perlin noise: layer o has lattice spacing
     `wavelength` / `lacunarity`^o [m] and weight `gain`^o. The lattices start at sample [0, 0] and
     do not depend on `cell`, so that a finer cell samples the same ground. Octaves, lacunarity and
-    gain are those of the first author's code for another robot (Quadruped_MPC_vs_RL); the paper
-    tells none, and the wavelength, about two body lengths, is ours.
+    gain are those of the first author's code for another robot (Quadruped_MPC_vs_RL), as the paper
+    gives none. The wavelength, about two body lengths, is ours.
 
     `GaitshiftError` where a number is out of range or `cell` is longer than half of the shortest
     lattice spacing. Source: Perlin, "Improving Noise", SIGGRAPH 2002, with random unit gradients.

@@ -80,12 +80,12 @@ def stairs(
 ) -> Terrain:
     """Stairs up to a landing and down again along x, each step `rise` high and `run` deep [m].
 
-    From either end come `landing` metres of level ground at z = 0, then at most `flight` steps up,
-    as many as leave `landing` metres or more on top in the middle. So the ground starts and ends
-    at 0 and is nowhere higher than `flight` × `rise`. A face leans over the cell it lies in.
-    Default run: the tread of a common staircase; flight and landing are ours.
+    Each end has `landing` metres of level ground at z = 0, then at most `flight` steps up, so many
+    that `landing` metres or more remain on top in the middle. So the ground starts and ends at 0
+    and is at most `flight` × `rise` high. A face slopes over the cell in which it lies. The default
+    run is the tread of a common staircase; flight and landing are ours.
 
-    `GaitshiftError` where a number is out of range or not even one step has room.
+    `GaitshiftError` where a number is out of range or the length is too short for one step.
     """
     _RISE.check(rise)
     _RUN.check(run)
@@ -116,7 +116,7 @@ def step(
 ) -> Terrain:
     """Level ground at 0 and, from the middle of the length on, at `height` [m]: one step up.
 
-    The face leans over the cell it lies in. `GaitshiftError` where a number is out of range.
+    The face slopes over the cell in which it lies. `GaitshiftError` where a number is out of range.
     """
     _STEP_HEIGHT.check(height)
     grid = Grid(length=length, width=width, cell=cell)
@@ -125,7 +125,7 @@ def step(
 
 
 def _whole(ratio: Float[np.ndarray, "*shape"]) -> Int[np.ndarray, "*shape"]:
-    """Whole part of a ratio of lengths; one that is whole but for rounding is whole."""
+    """Whole part of a ratio of lengths, tolerant of rounding errors."""
     return np.asarray(np.floor(ratio + 1e-9)).astype(int)
 
 

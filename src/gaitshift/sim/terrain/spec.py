@@ -50,14 +50,14 @@ def from_spec(
 ) -> Terrain:
     """Terrain that a spec describes: one piece, or a track of pieces separated by commas.
 
-    A piece is `NAME`, `NAME:NUMBER`, or either with its length `@METRES` behind it; the names and
-    their numbers are in `KINDS`. One piece alone is `length` [m] long unless it says otherwise; the
-    pieces of a track all say their lengths, which are rounded to whole cells, and `length` does not
-    count. `cell` [m] is the largest distance between samples, if None the finest that a piece asks
-    for. Fields begin at x = 0 with y = 0 in the middle.
+    A piece is `NAME` or `NAME:NUMBER`, optionally followed by its length `@METRES`; the names and
+    their numbers are in `KINDS`. A single piece without a length is `length` [m] long. Every piece
+    of a track needs a length, which is rounded to whole cells; `length` is then ignored. `cell` [m]
+    is the largest distance between samples; None: the finest default of the pieces. Fields begin at
+    x = 0 with y = 0 in the middle.
 
     The same spec, seed and sizes give the same bits. In a track each piece draws from its own
-    stream of the seed, so that changing one piece leaves the noise of the others.
+    stream of the seed, so that a change of one piece does not change the noise of the others.
 
     `GaitshiftError`, one line that names the faulty piece and what is allowed.
     """
@@ -122,7 +122,7 @@ def _number(text: str, written: str, quantity: Quantity) -> float:
 
 
 def _whole_cells(piece: _Piece, cell: float) -> float:
-    """Length of a track's piece, rounded to whole cells [m]."""
+    """Length of a piece of a track, rounded to whole cells [m]."""
     if piece.length is None:
         raise _faulty(piece.text, f"every piece of a track must have a length, as in {_TRACK}")
     return max(1, round(piece.length / cell)) * cell

@@ -1,4 +1,4 @@
-"""N robots stepped on all cores: joint targets in, what they sense and the truth out."""
+"""N robots stepped on all cores: joint targets in, proprioception and privileged state out."""
 
 from collections.abc import Sequence
 
@@ -20,15 +20,15 @@ CONTACT_FORCE = 1.0
 value of legged_gym."""
 
 CLEAR_OF_GROUND = 20.0
-"""Height at which robots are laid out before they are set down [m]; ours."""
+"""Height at which robots are posed before they are set on the ground [m]; ours."""
 
 
 class World:
     """N robots, each alone on its terrain.
 
-    Robots do not feel each other. With several terrains, robot i stands on terrain i mod K.
-    Between calls nothing moves; `sensed` and `truth` are always of now, no quantity a step late
-    (forces and torques are those of the last physics step, which led here).
+    Robots do not interact. With several terrains, robot i stands on terrain i mod K. Nothing moves
+    between calls. `sensed` and `truth` always describe the present state, without delay (forces and
+    torques are those of the last physics step, which led to this state).
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class World:
 
         Args:
             robot: whose model is simulated.
-            terrain: one for all, or several that the robots share out.
+            terrain: one for all robots, or several among which they are divided.
             n: number of robots.
             gains: preset of joint gains in `robot.gains`.
             threads: physics threads, 0 for all cores.
@@ -60,7 +60,7 @@ class World:
         self.place(np.arange(n), xy=np.zeros((n, 2)), yaw=np.zeros(n))
 
     def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
-        """Exchanges the ground; robots go on as they moved, set down on it where they stood."""
+        """Replaces the ground; robots keep their motion and are moved vertically onto it."""
         terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
         if not terrains:
             raise GaitshiftError("there must be at least one terrain, got none")
@@ -131,12 +131,12 @@ class World:
         self._applied[:, :3] = force_w
 
     def step(self, target: Float[np.ndarray, "N 12"]) -> tuple[Proprioception, Privileged]:
-        """One control step: joints are driven to `target` [rad], the physics moves on 10 ms.
+        """One control step of 10 ms in which the joints are driven to `target` [rad].
 
-        Gives `sensed` and `truth`.
+        Returns `sensed` and `truth`.
 
         Raises:
-            GaitshiftError: a target is not finite; nothing has moved then.
+            GaitshiftError: a target is not finite; the state is then unchanged.
         """
         if not np.isfinite(target).all():
             bad = int(np.flatnonzero(~np.isfinite(target).all(axis=1))[0])
@@ -150,11 +150,11 @@ class World:
         return self.sensed, self.truth
 
     def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
-        """Copies of qpos and qvel, as logs and videos want them."""
+        """Copies of qpos and qvel."""
         return self._qpos.copy(), self._qvel.copy()
 
     def _measure(self) -> None:
-        """Makes `truth` and `sensed` current."""
+        """Updates `truth` and `sensed`."""
         qpos, qvel, sensors = self._qpos, self._qvel, self._sensors
         feet, force = self._feet(sensors), sensors[:, 24:28].copy()
         quaternion = qpos[:, 3:POSE].copy()
@@ -192,7 +192,7 @@ class World:
         return height
 
     def _settle(self, ids: Int[np.ndarray, " K"]) -> None:
-        """Makes every measured quantity of these robots current."""
+        """Updates every measured quantity of these robots."""
         self._ctrl[ids] = self._qpos[ids, POSE:]
         self._applied[ids] = 0.0
         self._batch.forward(ids=ids)
@@ -201,7 +201,7 @@ class World:
     def _kept_state(
         self, terrains: tuple[Terrain, ...]
     ) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
-        """The present state, lifted or lowered so that no foot stands deeper than before."""
+        """The present state, moved vertically so that no foot penetrates deeper than before."""
         qpos, qvel = self.state()
         feet = self.truth.foot_position_w[..., :2]
         before = self._ground(feet, None)
