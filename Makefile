@@ -7,13 +7,11 @@ BIN := $(VENV)/bin
 NEWEST := build/newest
 PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?= -n 2 --dist worksteal
-GAITS ?= trot pace bound pronk walk three_one half_bound gallop
-SEED ?= 0
+GAITS ?=
 # What the wheel is tried with: quick tests that need neither torch nor a browser.
-WHEEL_TESTS := tests/test_reward_machine.py tests/test_gaits.py tests/test_terrain.py \
-    tests/test_height_difference.py tests/test_robot.py
+WHEEL_TESTS := tests/gait tests/shift tests/sim/test_terrain.py
 # What the newest versions are tried with, without torch: these, and pictures and physics.
-NEWEST_TESTS := $(WHEEL_TESTS) tests/test_plots.py tests/test_geometry.py tests/test_world.py
+NEWEST_TESTS := $(WHEEL_TESTS) tests/show/test_plots.py tests/show/test_geometry.py tests/sim/test_world.py
 
 # Stamps. "base" runs trained robots, "dev" trains and tests as well; dev contains base.
 BASE := $(VENV)/.base-installed
@@ -58,11 +56,8 @@ newest: $(DEV) ## the newest versions that pyproject.toml allows, on some of the
 bench: $(DEV) ## speed of the environment and of training on this machine
 	@$(BIN)/gaitshift bench
 
-policies: $(DEV) ## train the shipped gaits anew, one after another, and put them into the package
-	@for gait in $(GAITS); do \
-	    $(BIN)/gaitshift train $$gait --seed $(SEED) --out runs/$$gait-$(SEED) --overwrite || exit 1; \
-	done
-	@$(BIN)/python tools/ship_policy.py $(GAITS:%=runs/%-$(SEED))
+policies: $(DEV) ## train the shipped gaits anew by their records, and put them into the package
+	@$(BIN)/python tools/make_policies.py $(GAITS)
 
 docs: $(DEV) ## the documentation as a site: out/site/index.html
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet && echo out/site/index.html

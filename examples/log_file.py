@@ -14,7 +14,7 @@ import numpy as np
 
 from gaitshift.lab.identification import passages
 from gaitshift.robot.legs import LEGS
-from gaitshift.shift import Condition, HeightDifference
+from gaitshift.shift import load_graph, tuned
 
 
 def write_example(path: Path) -> None:
@@ -40,13 +40,13 @@ def write_example(path: Path) -> None:
 
 def main(path: Path) -> None:
     """Says where the condition fires."""
-    condition = Condition(statistic=HeightDifference(), alpha=0.04, beta=100.0)
+    graph = tuned(load_graph("height_difference"), beta=100.0)
     for passage in passages(path):
-        state, fired = condition.start(1), None
-        for signals in passage:
-            state, fire = condition.step(state, signals, shifted=np.array([False]))
-            if fire[0] and fired is None:
-                fired = signals.time
+        state, fired = graph.begin(1), None
+        for sensed in passage:
+            state, decision = graph.step(state, sensed)
+            if decision.fired[0] and fired is None:
+                fired = sensed.time
         begins = passage.time[passage.rough[:, 0].argmax()] if passage.rough.any() else None
         print(f"{passage.name}: rough from {begins} s, shift at {fired} s")
 

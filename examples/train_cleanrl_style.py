@@ -92,7 +92,7 @@ def main(iterations: int) -> None:
     """Trains for so many iterations."""
     torch.set_num_threads(1)  # networks this small gain nothing by more
     torch.manual_seed(0)
-    env = gymnasium.make_vec("gaitshift.env:gaitshift/trot-v0", num_envs=ROBOTS)
+    env = gymnasium.make_vec("gaitshift.sim.env:gaitshift/trot-v0", num_envs=ROBOTS)
     agent = Agent(env.single_observation_space.shape[0], env.single_action_space.shape[0])
     optimizer = torch.optim.Adam(agent.parameters(), LEARNING_RATE)
     observation = torch.from_numpy(env.reset(seed=0)[0]).float()

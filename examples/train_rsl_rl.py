@@ -69,7 +69,9 @@ def main(iterations: int) -> None:
     """Trains for so many iterations."""
     torch.set_num_threads(1)  # networks this small gain nothing by more
     torch.manual_seed(0)
-    env = RslRlEnv(gymnasium.make_vec("gaitshift.env:gaitshift/trot-v0", num_envs=ROBOTS), seed=0)
+    env = RslRlEnv(
+        gymnasium.make_vec("gaitshift.sim.env:gaitshift/trot-v0", num_envs=ROBOTS), seed=0
+    )
     runner = OnPolicyRunner(env, CONFIG, log_dir=None, device="cpu")
     runner.learn(iterations)
     torch.save(runner.alg.actor.state_dict(), "trot_rsl_rl.pt")

@@ -18,7 +18,7 @@ STEPS = 64  # of each robot in an iteration
 def main(iterations: int) -> None:
     """Trains for so many iterations."""
     torch.set_num_threads(1)  # networks this small gain nothing by more
-    env = make_vec_env("gaitshift.env:gaitshift/trot-v0", n_envs=ROBOTS, seed=0)
+    env = make_vec_env("gaitshift.sim.env:gaitshift/trot-v0", n_envs=ROBOTS, seed=0)
     ppo = PPO("MlpPolicy", env, n_steps=STEPS, batch_size=64, n_epochs=4, seed=0, device="cpu")
     ppo.learn(iterations * ROBOTS * STEPS)
     ppo.save("trot_sb3.zip")

@@ -15,6 +15,9 @@ SCREENS = Path(__file__).parent.parent / "out" / "screens"
 
 needed = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 
+_IS_OPAQUE = """() => [...document.querySelectorAll("canvas")].every(
+    (canvas) => getComputedStyle(canvas).opacity === "1")"""
+
 _FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -50,16 +53,18 @@ def shows_a_robot(points):
 def wait_for_robot(page, name, columns=1.0, rows=1.0):
     """Until the page shows a robot in this share of its columns and rows, from the top left.
 
-    A page that opens fades in, so that single screenshots may show it under a veil. The last
-    screenshot is kept as out/screens/NAME.png.
+    viser fades its canvas in, a little with each picture that it draws: the page itself says when
+    that is over, and only then are screenshots looked at, which take the time for pictures from it.
+    The last screenshot is kept as out/screens/NAME.png.
     """
+    page.wait_for_function(_IS_OPAQUE, polling=1000)
 
     def shown():
         points = keep(page, name)
         high, wide, _ = points.shape
         return shows_a_robot(points[: round(high * rows), : round(wide * columns)])
 
-    wait_until(shown)
+    wait_until(shown, pause=2.0)
 
 
 def launched(play):

@@ -6,14 +6,21 @@ callers hand it; the sample of later ones shows what comes up in a long run.
 
 import functools
 import inspect
+import typing
 from dataclasses import is_dataclass
+from typing import Any, Self, get_args
 
 import jaxtyping
-from beartype import BeartypeConf, beartype
+from beartype import BeartypeConf, FrozenDict, beartype
 from jaxtyping import install_import_hook
 
-check_types = beartype(conf=BeartypeConf(is_pep484_tower=True))
-"""beartype that takes an int for a float, as type checkers do (PEP 484)."""
+check_types = beartype(
+    conf=BeartypeConf(is_pep484_tower=True, hint_overrides=FrozenDict({typing.Self: object}))
+)
+"""beartype that takes an int for a float, as type checkers do (PEP 484).
+
+It knows `Self` where it decorates whole classes alone, so that here anything may stand for it.
+"""
 
 FIRST, EVERY = 50, 20
 """ours: of each function's calls in a test, the first 50 are checked and then one in 20."""
@@ -56,7 +63,18 @@ def _sampled(plain, check):
         count = _calls[key] = _calls.get(key, 0) + 1
         if count > FIRST and count % EVERY:
             return plain(*args, **kwargs)
-        checked = checked or check(plain)
+        checked = checked or check(_of_any_class(plain))
         return checked(*args, **kwargs)
 
     return call
+
+
+def _of_any_class(function):
+    """The function with Any where it says Self: beartype sees methods without their class."""
+    hints = function.__annotations__
+    function.__annotations__ = {n: Any if _says_self(h) else h for n, h in hints.items()}
+    return function
+
+
+def _says_self(hint):
+    return hint is Self or any(map(_says_self, get_args(hint)))

@@ -11,6 +11,7 @@ import pytest
 
 TOOLS = Path(__file__).parent.parent / "tools"
 STEPS, ROBOTS = 20, 2
+PLACE = "truth.base_position_w"
 
 
 @pytest.fixture(scope="module")
@@ -22,12 +23,12 @@ def differences():
 
 
 def log(**changed):
-    """Arrays of a log in which robot 1 shifts at step 12; each value of `qpos` is its index."""
+    """Arrays of a log in which robot 1 shifts at step 12; each value of a position is its index."""
     gait = np.zeros((STEPS, ROBOTS), dtype=int)
     gait[12:, 1] = 1
     return {
-        "time": 0.01 * np.arange(1, STEPS + 1),
-        "qpos": np.arange(STEPS * ROBOTS * 3, dtype=np.float32).reshape(STEPS, ROBOTS, 3),
+        "sensed.time": 0.01 * np.arange(1, STEPS + 1),
+        PLACE: np.arange(STEPS * ROBOTS * 3, dtype=np.float32).reshape(STEPS, ROBOTS, 3),
         "k": np.full((STEPS, ROBOTS), np.nan),
         "gait": gait,
         "gaits": np.array(["trot", "bound"]),
@@ -58,12 +59,12 @@ def test_logs_with_the_same_values_are_equal_and_nan_equals_nan(compared):
 
 def test_one_entry_that_differs_is_found_with_its_step_and_size(compared):
     other = log()
-    other["qpos"][7, 1, 2] += 0.25
-    whole, qpos, shifts = compared(log(), other)
+    other[PLACE][7, 1, 2] += 0.25
+    whole, place, shifts = compared(log(), other)
     assert not whole.equal
     assert (whole.largest, whole.first) == (0.25, (7,))
-    assert qpos.what == "log.npz: qpos"
-    assert (qpos.equal, qpos.largest, qpos.first) == (False, 0.25, (7, 1, 2))
+    assert place.what == f"log.npz: {PLACE}"
+    assert (place.equal, place.largest, place.first) == (False, 0.25, (7, 1, 2))
     assert shifts.equal
 
 
@@ -84,19 +85,24 @@ def test_a_later_shift_differs_in_the_steps_between(compared):
 
 @pytest.mark.parametrize(
     "other",
-    [log()["qpos"].astype(float), log()["qpos"][:, :, :2], log()["qpos"][:-1]],
+    [
+        log()[PLACE].astype(float),
+        log()[PLACE][:, :, :2],
+        log()[PLACE][:-1],
+    ],
     ids=["type", "width", "length"],
 )
 def test_another_type_or_shape_differs_without_a_value_that_does(compared, other):
-    _, qpos, _ = compared(log(), log(qpos=other))
-    assert (qpos.equal, qpos.largest, qpos.first) == (False, None, None)
+    _, place, _ = compared(log(), log() | {PLACE: other})
+    assert (place.equal, place.largest, place.first) == (False, None, None)
 
 
 def test_renamed_arrays_are_compared_and_arrays_of_one_log_alone_do_not_count(differences):
-    new = log(base=log()["qpos"][..., :2], rest=log()["qpos"][..., 2:], counter=log()["k"], beta=1)
-    del new["qpos"], new["k"]
+    place = log()[PLACE]
+    new = log(base=place[..., :2], rest=place[..., 2:], counter=log()["k"], beta=1)
+    del new[PLACE], new["k"]
     renames = {
-        "qpos": lambda log: np.concatenate([log["base"], log["rest"]], axis=2),
+        PLACE: lambda log: np.concatenate([log["base"], log["rest"]], axis=2),
         "k": "counter",
         "torque": "effort",
     }

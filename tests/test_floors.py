@@ -86,20 +86,20 @@ def test_condition_and_machine_work_where_they_are_all_there_is():
     program = """
 import numpy as np
 from gaitshift.gait import gaits
-from gaitshift.shift import Condition, Signals
-condition = Condition(alpha=0.05, beta=11.0)
-state = condition.start(1)
+from gaitshift.shift import Proprioception, load_graph, tuned
+graph = tuned(load_graph("height_difference"), alpha=0.05, beta=11.0)
+state = graph.begin(1)
 feet = np.zeros((1, 4, 3))
 feet[0, :, 2] = (-0.5, -0.5, -0.4, -0.4)  # four pairs of six differ by 0.1 m
 fired = []
 for _ in range(4):
-    signals = Signals(
+    sensed = Proprioception(
         contact=np.ones((1, 4), dtype=bool),
         foot_position_b=feet,
-        gravity_b=np.array([[0.0, 0.0, -1.0]]),
+        orientation=np.array([[1.0, 0.0, 0.0, 0.0]]),
     )
-    state, fire = condition.step(state, signals, np.zeros(1, dtype=bool))
-    fired.append(bool(fire[0]))
+    state, decision = graph.step(state, sensed)
+    fired.append(bool(decision.fired[0]))
 print(fired, gaits.load("trot").enter(np.array([[False, True, True, False]])))
 """
     done = run_without(HEAVY, program)

@@ -18,8 +18,8 @@ def test_the_readmes_code_runs_and_its_condition_counts_nothing_on_level_feet():
     (block,) = (text for kind, text in fences(README) if kind == "python")
     names = {}
     exec(block, names)
-    assert names["state"].k.tolist() == [0.0]
-    assert names["fire"].tolist() == [False]
+    assert names["state"].k.tolist() == [[0.0, 0.0]]
+    assert names["decision"].fired.tolist() == [False]
 
 
 def test_the_readme_is_short_and_its_one_table_leads_to_the_pages_that_answer():

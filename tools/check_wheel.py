@@ -26,7 +26,7 @@ OLDEST = "3.11"
 LARGEST = 10_000_000
 """Size that neither file may exceed [bytes]; ours: pictures and policies are most of 7 MB."""
 
-IN_WHEEL = ("gaitshift/py.typed", "gaitshift/gaits/trot.toml")
+IN_WHEEL = ("gaitshift/py.typed", "gaitshift/gait/gaits/trot.toml")
 IN_SDIST = ("pyproject.toml", "LICENSE", "CHANGELOG.md", "src/gaitshift/py.typed", "tests")
 IN_NEITHER = ("node_modules", "__pycache__", ".venv", "runs", "out")
 """Names of files and folders, anywhere in a path."""

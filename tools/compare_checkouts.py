@@ -15,13 +15,35 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
-from array_differences import Renames, Row, compare_files
+import numpy as np
+from array_differences import Arrays, Renames, Row, compare_files
 
-LOG_RENAMES: Renames = {}
+
+def _stacked(*names: str) -> Callable[[Arrays], np.ndarray]:
+    """An old array that is several new ones side by side along its last axis."""
+
+    def joined(new: Arrays) -> np.ndarray:
+        parts = [new[name] for name in names]
+        return np.concatenate([p if p.ndim > 2 else p[..., None] for p in parts], axis=-1)
+
+    return joined
+
+
+LOG_RENAMES: Renames = {
+    "time": "sensed.time",
+    "qpos": _stacked("truth.base_position_w", "truth.base_quaternion_w", "sensed.joint_position"),
+    "torque": "sensed.joint_torque",
+    "contact": "sensed.contact",
+    "foot_position_w": "truth.foot_position_w",
+    "clearance": "truth.clearance",
+    "gait": lambda new: new["gait"].astype(np.int16),
+    "machine_state": lambda new: new["machine_state"].astype(np.int16),
+    "value": "sensed.value",
+}
 """Arrays of logs: the old name, and the new one or the old array out of the new log."""
 FIELD_RENAMES: Renames = {}
 """The same for columns of tables, fields of JSON (`verdict.clean`) and networks' initialisers."""

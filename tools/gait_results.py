@@ -13,8 +13,8 @@ from gaitshift.control import policy
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import SIZES
 from gaitshift.lab.gait_analysis import FIRST_GAITS
-from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.legs import LEGS
+from gaitshift.table import markdown
 
 POLICIES = Path(policy.__file__).parent / "policies"
 PAGE = Path(__file__).parent.parent / "docs" / "results" / "gaits.md"
@@ -35,8 +35,9 @@ frequency, the first 2 s left out. `gaitshift.gait_analysis` defines the figures
 by `tools/gait_results.py` from the records beside the policies.
 
 - *Clean*: the contacts are those of the gait, and every limit is kept. Trot, pace and bound have
-  stricter limits than the others (`src/gaitshift/gait_analysis/limits.py`). The others have none on
-  noise of 0.15 m and more, slopes, stairs and steps (`src/gaitshift/evaluation/trials.py`).
+  stricter limits than the others (`src/gaitshift/lab/gait_analysis/limits.py`). The others have
+  none on noise of 0.15 m and more, slopes, stairs and steps
+  (`src/gaitshift/lab/evaluation/trials.py`).
 - *Cycles*: rounds of the machine a second.
 - *Pattern*: the share of control steps whose contacts are a stance of the gait.
 - *Touchdowns*: onsets of contact over those that the machine asks for in a cycle; 1 without
@@ -46,9 +47,8 @@ by `tools/gait_results.py` from the records beside the policies.
 
 TRAINING = """## Training
 
-The policies come from more than one recipe and seed. Those of {iterations} iterations are made by
-the default recipe. No preset holds the recipe of the others, so their command now makes another
-policy ([both recipes](training-recipe.md)).
+The policies come from more than one recipe and seed. The records beside them name both, and
+`make policies` trains by them ([both recipes](training-recipe.md)).
 """
 
 TRIALS = """## Trials
@@ -77,7 +77,7 @@ def page() -> str:
         seconds=size.seconds,
     )
     parts = [head, _figures(records)]
-    parts += [TRAINING.format(iterations=Recipe().iterations), _training(records)]
+    parts += [TRAINING, _training(records)]
     parts += [TRIALS.format(pushed=size.pushed, episodes=size.episodes), _trials(records)]
     parts += [COMMANDS, _commands(records)]
     parts += [_gait(name, record) for name, record in records.items()]
@@ -179,7 +179,7 @@ def _gait(name: str, record: dict[str, Any]) -> str:
     ]
     lines = [f"## {machine.title}\n", f"{machine.description}\n"]
     lines.append(f"![Gait diagram and phases of {name}](gaits/{name}.png)\n")
-    recipe = "" if record["iterations"] == Recipe().iterations else ", with an earlier recipe"
+    recipe = f", preset `{record['preset']}`"
     made, judged = record["command"], record["evaluation"]["command"]
     lines.append(f"Made by `{made}`{recipe}, judged by `{judged}`.")
     lines.append(f"[Its training](training/{name}.png).\n")
@@ -211,8 +211,7 @@ def _feet(values: list[float]) -> str:
 
 
 def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
+    return markdown(head, rows) + "\n"
 
 
 if __name__ == "__main__":

@@ -7,7 +7,6 @@ and ships all.
 """
 
 import argparse
-import csv
 import json
 import shutil
 from dataclasses import asdict
@@ -16,6 +15,7 @@ from typing import Any
 
 from gait_results import PAGE, page
 
+from gaitshift import table
 from gaitshift.control import policy
 from gaitshift.lab.evaluation import SIZES, follow_commands, run_trials
 from gaitshift.show.plots import hildebrand_diagram, training_curves
@@ -34,12 +34,10 @@ def ship(run: Path, trials: str) -> None:
     evaluation = judged(loaded, trials)
     shutil.copyfile(run / "policy.onnx", POLICIES / f"{name}.onnx")
     write_record(name, {**loaded.info.training, "evaluation": evaluation})
-    with (run / "progress.csv").open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if int(row["iteration"]) % EVERY == 0]
-    with (POLICIES / f"{name}.csv").open("w", newline="") as file:
-        lines = csv.DictWriter(file, COLUMNS, extrasaction="ignore", lineterminator="\n")
-        lines.writeheader()
-        lines.writerows(rows)
+    rows = [row for row in table.read(run / "progress.csv") if int(row["iteration"]) % EVERY == 0]
+    table.write(
+        POLICIES / f"{name}.csv", [{column: row[column] for column in COLUMNS} for row in rows]
+    )
     CURVES.mkdir(parents=True, exist_ok=True)
     training_curves(run / "progress.csv", CURVES / f"{name}.png")
 

@@ -32,6 +32,7 @@ from gaitshift.lab.studies.transitions import Pair, run_pair
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import POLICY
 from gaitshift.sim.reward import ADDITIONS, BONUS_SHARES
+from gaitshift.table import markdown
 
 RUNS = Path("runs/evidence")
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
@@ -270,10 +271,8 @@ def _mean(figures: list[dict[str, Any]], name: str, of: Callable[[Any], float]) 
 
 
 def _write(name: str, text: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> Path:
-    lines = [columns, ("---",) * len(columns), *rows]
-    table = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     path = RESULTS / name
-    path.write_text(f"{text}\n{table}\n")
+    path.write_text(f"{text}\n{markdown(columns, rows)}\n")
     return path
 
 

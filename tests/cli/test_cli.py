@@ -65,6 +65,18 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["train", "trot", "--robots", "many"], "--robots"),
         (["demo", "--episodes", "1.5"], "invalid literal for int() with base 10: '1.5'"),
         (["demo", "--speed", "3"], "--speed"),
+        (["evaluate", "trot", "--controller", "wheels"], "known controllers: policy, cpg"),
+        (["evaluate", "gallop", "--controller", "cpg"], "gallop"),
+        (
+            ["evaluate", "trot", "--controller", "cpg", "--trials", "quick"],
+            "--trials is for policies, got --controller cpg",
+        ),
+        (
+            ["evaluate", "trot", "--controller", "cpg", "--robot-file", "dog.toml"],
+            "--robot-file is for policies, got --controller cpg",
+        ),
+        (["demo", "--graph", "lava"], "unknown graph 'lava'"),
+        (["demo", "--controller", "wheels"], "known controllers: policy, cpg"),
         (["evaluate"], "Missing"),
         (["evaluat"], "evaluat"),
     ],
@@ -200,7 +212,24 @@ def test_json_is_one_object_and_nothing_else_on_stdout(
     figures = json.loads(capsys.readouterr().out)
     assert figures["gait"] == "trot"
     assert figures["survival"] == 1.0
-    assert Log.load(log).qpos.shape == (50, 4, 19)
+    assert Log.load(log).sensed.joint_position.shape == (50, 4, 12)
+
+
+def test_oscillators_are_evaluated_as_policies_are(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """They trot on flat ground at their own stride frequency, 2.2 Hz, and have no critic."""
+    log = tmp_path / "run.npz"
+    arguments = ["--controller", "cpg", "--episodes", "2", "--seconds", "4", "--log", str(log)]
+    main(["evaluate", "trot", *arguments, "--json"])
+    figures = json.loads(capsys.readouterr().out)
+    assert (figures["controller"], figures["gait"]) == ("cpg", "trot")
+    assert figures["survival"] == 1.0
+    assert figures["cycles_per_s"] == pytest.approx(2.2, abs=0.2)
+    walked = Log.load(log)
+    assert walked.gaits == ("trot",)
+    assert walked.sensed.value is None
+    np.testing.assert_allclose(walked.sensed.stride_frequency_command, 2.2)
 
 
 def test_gaits_are_listed_drawn_and_printed_as_mermaid(
@@ -253,7 +282,7 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
 INTERRUPTED = """
 import os, signal, sys
 from gaitshift.cli import main
-from gaitshift.training.run import Run
+from gaitshift.learn.run import Run
 iterate = Run.iterate
 def interrupted(self):
     row = iterate(self)

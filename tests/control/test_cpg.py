@@ -17,11 +17,11 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait.gaits import load
 from gaitshift.lab.evaluation.evaluate import grounds_of
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import measure, robot_mass
+from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.legs import LEGS
-from gaitshift.shift import Condition, GaitGraph, TouchdownSurprise
+from gaitshift.shift import Rule, TouchdownSurprise, there_and_back
 from gaitshift.sim.terrain import from_spec
 from gaitshift.sim.world import World
 
@@ -111,7 +111,7 @@ def walked(name, ground, seconds=8.0, n=8):
 
 @pytest.mark.parametrize("name", GAITS)
 def test_each_gait_walks_at_its_speed_and_is_named_by_its_contacts(name):
-    figures = measure(walked(name, "flat"), {name: load(name)}, mass=robot_mass("anymal_b"))
+    figures = measure(walked(name, "flat"), {name: load(name)}, ANYMAL_B)
     assert figures["survival"] == 1.0
     assert figures["verdict"]["gait"] == name
     assert figures["speed_mean"] == pytest.approx(GAITS[name].speed, abs=0.08)
@@ -128,14 +128,9 @@ def test_robots_keep_on_their_feet_on_mild_noise(name, ground):
 
 def test_oscillators_shift_by_the_very_condition_of_trained_policies():
     """Trot to bound on noise, by an α between what flat ground and the noise show."""
-    condition = Condition(
-        statistic=TouchdownSurprise(),
-        alpha=0.002,
-        beta=5.0,
-        alpha_back=0.005,
-        beta_back=1e6,
+    graph = there_and_back(
+        TouchdownSurprise(), Rule(alpha=0.002, beta=5.0), Rule(when="below", alpha=0.005, beta=1e6)
     )
-    graph = GaitGraph.of(condition, flat="trot", rough="bound")
     n = 6
     controller = CpgController(["trot", "bound"], n, start="trot")
     ground = from_spec("flat@5,perlin:0.06@8", seed=3, length=1.0, width=8.0)
@@ -181,9 +176,12 @@ def test_oscillators_are_judged_as_policies_are(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["trot", "--trials", "quick"], "--trials must not be given with --controller cpg"),
-        (["trot", "--commands"], "--commands must not be given with --controller cpg"),
-        (["trot", "--robot-file", "pony.toml"], "--robot-file must not be given"),
+        (["trot", "--trials", "quick"], "--trials is for policies, got --controller cpg"),
+        (["trot", "--commands"], "--commands is for policies, got --controller cpg"),
+        (
+            ["trot", "--robot-file", "pony.toml"],
+            "--robot-file is for policies, got --controller cpg",
+        ),
         (["gallop", "--log", "{folder}/new/log.npz"], "got 'gallop'"),
     ],
 )

@@ -10,19 +10,20 @@ from gaitshift.control.observation import (
     DEFAULT_SLICES,
     JOINT_MIRROR,
     PAPER_SLICES,
+    GaitState,
     Observation,
-    Situation,
-    last_touch,
 )
+from gaitshift.control.walker import Walker
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.robot.command import Command
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.robot.motion import Motion
-from gaitshift.shift import HeightDifference, Signals
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift import HeightDifference
 from gaitshift.sim.terrain import flat
 from gaitshift.sim.world import World
 from symmetric import symmetric_robot
+from turning import rotation
 
 TROT = gaits.load("trot")
 QUICK_TROT = RewardMachine.from_dict(
@@ -68,42 +69,43 @@ SIZES = {
 def two_robots():
     """Robot 0 rolled by 30° to its right, robot 1 turned left by 90°; no entry like another."""
     ramp = np.arange(1.0, 13.0)
-    motion = Motion(
+    # cos 15°, sin 15°; cos 45°, sin 45°
+    orientation = np.array(
+        [[0.9659258262890683, 0.25881904510252074, 0.0, 0.0], [HALF, 0.0, 0.0, HALF]]
+    )
+    base_w = np.array([[5.0, 6.0, 0.52], [7.0, 8.0, 0.61]])
+    foot_w = np.array(
+        [
+            [[1, 2, 0.05], [3, 4, 0.03], [5, 6, 0.02], [7, 8, 0.09]],
+            [[1, 2, 0.07], [3, 4, 0.08], [5, 6, 0.06], [7, 8, 0.01]],
+        ]
+    )
+    velocity_w = np.array([[1.0, 2.0, 3.0], [-0.3, 1.2, 0.1]])
+    turns = (rotation(np.pi / 6, 0.0, 0.0), rotation(0.0, 0.0, np.pi / 2))
+    sensed = Proprioception(
+        contact=np.array([[True, False, False, False], [False, True, True, False]]),
+        foot_position_b=np.stack(
+            [(foot - base) @ turn for foot, base, turn in zip(foot_w, base_w, turns, strict=True)]
+        ),
+        orientation=orientation,
         joint_position=np.stack([STANCE + 0.01 * ramp, STANCE - 0.02 * ramp]),
         joint_velocity=np.stack([ramp, 20.0 + ramp]),
         joint_torque=np.stack([100.0 + ramp, 200.0 + ramp]),
-        base_position_w=np.array([[5.0, 6.0, 0.52], [7.0, 8.0, 0.61]]),
-        # cos 15°, sin 15°; cos 45°, sin 45°
-        base_quaternion_w=np.array(
-            [[0.9659258262890683, 0.25881904510252074, 0.0, 0.0], [HALF, 0.0, 0.0, HALF]]
-        ),
-        base_linear_velocity_w=np.array([[1.0, 2.0, 3.0], [-0.3, 1.2, 0.1]]),
-        base_angular_velocity_b=np.array([[0.11, 0.12, 0.13], [0.21, 0.22, 0.23]]),
-        foot_position_w=np.array(
-            [
-                [[1, 2, 0.05], [3, 4, 0.03], [5, 6, 0.02], [7, 8, 0.09]],
-                [[1, 2, 0.07], [3, 4, 0.08], [5, 6, 0.06], [7, 8, 0.01]],
-            ]
-        ),
-        foot_velocity_w=np.full((2, 4, 3), 9.0),
-        foot_force=np.full((2, 4), 99.0),
-        contact=np.array([[True, False, False, False], [False, True, True, False]]),
-        clearance=np.full((2, 4), 8.0),
-        body_contact=np.array([False, True]),
+        velocity_b=np.stack([v @ turn for v, turn in zip(velocity_w, turns, strict=True)]),
+        angular_velocity_b=np.array([[0.11, 0.12, 0.13], [0.21, 0.22, 0.23]]),
     )
-    return Situation(
+    state = GaitState(
         machine_state=np.array([0, 1]),
         steps_in_state=np.array([7, 260]),
-        motion=motion,
-        command=Command(
-            forward_speed=np.array([1.2, 0.4]),
-            yaw_rate=np.array([-0.3, 0.2]),
-            stride_frequency=np.array([2.5, 1.6]),
-        ),
         last_action=np.stack([0.5 * ramp, -ramp]),
-        stance=STANCE,
         touch_height=np.array([[-0.5, -0.48, -0.4, -0.42], [-0.5, -0.5, -0.5, -1.1]]),
     )
+    command = Command(
+        forward_speed=np.array([1.2, 0.4]),
+        yaw_rate=np.array([-0.3, 0.2]),
+        stride_frequency=np.array([2.5, 1.6]),
+    )
+    return state, sensed, command
 
 
 # The scales 1/20 of a control step and 1/10 of a rad/s are part of every policy file: numbers.
@@ -144,17 +146,17 @@ HAND_TABLE = {
 
 @pytest.mark.parametrize("name", HAND_TABLE)
 def test_each_slice_equals_the_hand_table(name):
-    observe = Observation(TROT)
-    seen = observe(two_robots())[:, observe.slices[name]]
+    observe = Observation(TROT, tuple(STANCE))
+    seen = observe(*two_robots())[:, observe.slices[name]]
     np.testing.assert_allclose(seen, HAND_TABLE[name], rtol=1e-6, atol=1e-7)
 
 
 def test_slices_stand_one_after_another_in_the_papers_order():
-    observe = Observation(TROT)
+    observe = Observation(TROT, tuple(STANCE))
     assert list(observe.slices) == list(SIZES)
     edges = np.cumsum([0, *SIZES.values()]).tolist()
     assert [(s.start, s.stop) for s in observe.slices.values()] == list(pairwise(edges))
-    assert observe.size == sum(SIZES.values()) == observe(two_robots()).shape[1]
+    assert observe.size == sum(SIZES.values()) == observe(*two_robots()).shape[1]
 
 
 def test_the_papers_slices_are_its_nine_and_end_before_the_command():
@@ -163,81 +165,96 @@ def test_the_papers_slices_are_its_nine_and_end_before_the_command():
 
 
 def test_an_observation_of_other_slices_shows_them_in_the_order_asked_for():
-    observe = Observation(TROT, ("yaw_rate_command", "contact", "machine_state"))
+    observe = Observation(TROT, tuple(STANCE), ("yaw_rate_command", "contact", "machine_state"))
     expected = [[-0.3, 1, 0, 0, 0, 1, 0], [0.2, 0, 1, 1, 0, 0, 1]]
-    np.testing.assert_allclose(observe(two_robots()), expected, rtol=1e-6)
+    np.testing.assert_allclose(observe(*two_robots()), expected, rtol=1e-6)
 
 
 def test_observations_are_float32_and_new_every_time():
-    observe = Observation(TROT)
-    first, second = observe(two_robots()), observe(two_robots())
+    observe = Observation(TROT, tuple(STANCE))
+    first, second = observe(*two_robots()), observe(*two_robots())
     assert first.dtype == np.float32
     assert not np.shares_memory(first, second)
 
 
 def test_a_robot_is_shown_the_same_alone_as_among_others():
-    observe, situation = Observation(TROT), two_robots()
+    observe, (state, sensed, command) = Observation(TROT, tuple(STANCE)), two_robots()
     for robot in range(2):
         one = np.array([robot])
-        alone = Situation(
-            machine_state=situation.machine_state[one],
-            steps_in_state=situation.steps_in_state[one],
-            motion=situation.motion.of(one),
-            command=situation.command.of(one),
-            last_action=situation.last_action[one],
-            stance=STANCE,
-            touch_height=situation.touch_height[one],
-        )
-        np.testing.assert_array_equal(observe(alone), observe(situation)[one])
+        alone = observe(state.robots(one), sensed.robots(one), command.of(one))
+        np.testing.assert_array_equal(alone, observe(state, sensed, command)[one])
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("joint_position", "joint_position"),
+        ("joint_velocity", "joint_velocity"),
+        ("velocity_b", "base_linear_velocity_b"),
+        ("angular_velocity_b", "base_angular_velocity_b"),
+    ],
+)
+def test_what_a_robot_does_not_sense_and_the_policy_wants_is_named(name, shown):
+    state, sensed, command = two_robots()
+    with pytest.raises(GaitshiftError, match=f"the policy' needs '{name}', which is not given"):
+        Observation(TROT, tuple(STANCE), (shown,))(state, replace(sensed, **{name: None}), command)
 
 
 def test_heights_of_the_last_touch_are_those_that_the_shift_condition_keeps():
-    """Told twice: here from the world, by the condition from the body frame and gravity."""
+    """Kept twice: here by the walker for the policy, there by the condition's statistic."""
     rng, world = np.random.default_rng(5), World(ANYMAL_B, flat(20.0, 20.0), 3, threads=1)
-    condition = HeightDifference(frame="gravity")
-    height, kept = condition.start(3), last_touch(world.motion)
-    np.testing.assert_allclose(kept, world.motion.foot_height)
-    moved = 0
+    condition, walker = HeightDifference(frame="gravity"), walker_of(TROT, ANYMAL_B)
+    height, state = condition.start(3), walker.begin(world.sensed)
+    np.testing.assert_allclose(state.touch_height, world.sensed.foot_height)
+    moved, action = 0, np.zeros((3, 12))
     for _ in range(150):
         target = ANYMAL_B.stance_angles + rng.normal(0.0, 0.5, (3, 12))
-        motion, before = world.step(target), kept
-        kept = last_touch(motion, before)
-        height, _ = condition.step(height, Signals.from_motion(motion))
-        touched = ~np.isnan(height)
+        (sensed, _), before = world.step(target), state.touch_height
+        state, _ = walker.step(state, action, sensed, Command.straight(3))
+        height, _ = condition.step(height, sensed)
+        touched, kept = ~np.isnan(height), state.touch_height
         np.testing.assert_allclose(kept[touched], height[touched], atol=1e-9)
-        np.testing.assert_array_equal(kept[~motion.contact], before[~motion.contact])
-        moved += np.count_nonzero(~motion.contact & (motion.foot_height != kept))
+        np.testing.assert_array_equal(kept[~sensed.contact], before[~sensed.contact])
+        moved += np.count_nonzero(~sensed.contact & (sensed.foot_height != kept))
     assert moved > 100, "feet swing and are remembered where they stood"
+
+
+def walker_of(machine, robot):
+    """A walker of this machine on this robot."""
+    return Walker(
+        machine=machine,
+        observation=Observation(machine, robot.stance),
+        action_scale=robot.action_scale,
+    )
 
 
 def test_an_unknown_slice_is_refused_with_those_there_are():
     with pytest.raises(GaitshiftError, match=r"machine_state, wait, .*got 'smell'"):
-        Observation(TROT, ("contact", "smell"))
+        Observation(TROT, tuple(STANCE), ("contact", "smell"))
 
 
 # The mirror -------------------------------------------------------------------------------------
 
 
-def mirrored_motion(motion):
-    """What a mirror in the plane y = 0 shows of a motion, written from the geometry."""
+LEVEL_STANCE = (0.0,) * 12
+"""Its own mirror image, as a stance must be that is the stance of both."""
+
+
+def mirrored(sensed):
+    """What a mirror in the plane y = 0 shows of what is sensed, written from the geometry."""
     legs, joints = [1, 0, 3, 2], [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
     abduction = np.array([-1.0, 1.0, 1.0] * 4)
     across = np.array([1.0, -1.0, 1.0])
-    return Motion(
-        joint_position=abduction * motion.joint_position[:, joints],
-        joint_velocity=abduction * motion.joint_velocity[:, joints],
-        joint_torque=abduction * motion.joint_torque[:, joints],
-        base_position_w=across * motion.base_position_w,
+    return Proprioception(
+        contact=sensed.contact[:, legs],
+        foot_position_b=across * sensed.foot_position_b[:, legs],
         # A rotation about an axis becomes one about the mirrored axis, the other way round.
-        base_quaternion_w=np.array([1.0, -1.0, 1.0, -1.0]) * motion.base_quaternion_w,
-        base_linear_velocity_w=across * motion.base_linear_velocity_w,
-        base_angular_velocity_b=-across * motion.base_angular_velocity_b,
-        foot_position_w=across * motion.foot_position_w[:, legs],
-        foot_velocity_w=across * motion.foot_velocity_w[:, legs],
-        foot_force=motion.foot_force[:, legs],
-        contact=motion.contact[:, legs],
-        clearance=motion.clearance[:, legs],
-        body_contact=motion.body_contact,
+        orientation=np.array([1.0, -1.0, 1.0, -1.0]) * sensed.orientation,
+        joint_position=abduction * sensed.joint_position[:, joints],
+        joint_velocity=abduction * sensed.joint_velocity[:, joints],
+        joint_torque=abduction * sensed.joint_torque[:, joints],
+        velocity_b=across * sensed.velocity_b,
+        angular_velocity_b=-across * sensed.angular_velocity_b,
     )
 
 
@@ -245,29 +262,28 @@ def mirrored_motion(motion):
     ("gait", "images"), [("trot", [1, 0]), ("pace", [1, 0]), ("bound", [0, 1])]
 )
 def test_the_mirrored_observation_is_the_observation_of_the_mirrored_motion(gait, images):
-    observe, seen = Observation(gaits.load(gait)), two_robots()
+    observe, (state, sensed, command) = Observation(gaits.load(gait), LEVEL_STANCE), two_robots()
     abduction = np.array([-1.0, 1.0, 1.0] * 4)
-    reflected = Situation(
-        machine_state=np.array(images)[seen.machine_state],
-        steps_in_state=seen.steps_in_state,
-        motion=mirrored_motion(seen.motion),
-        command=replace(seen.command, yaw_rate=-seen.command.yaw_rate),
-        last_action=abduction * seen.last_action[:, [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]],
-        # Only a stance that is its own mirror image can be the stance of both.
-        stance=np.zeros(12),
-        touch_height=seen.touch_height[:, [1, 0, 3, 2]],
+    reflected = observe(
+        GaitState(
+            machine_state=np.array(images)[state.machine_state],
+            steps_in_state=state.steps_in_state,
+            last_action=abduction * state.last_action[:, [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]],
+            touch_height=state.touch_height[:, [1, 0, 3, 2]],
+        ),
+        mirrored(sensed),
+        replace(command, yaw_rate=-command.yaw_rate),
     )
-    upright = replace(seen, stance=np.zeros(12))
     order, signs = observe.mirror
     np.testing.assert_allclose(
-        signs * observe(upright)[:, order], observe(reflected), rtol=1e-6, atol=1e-7
+        signs * observe(state, sensed, command)[:, order], reflected, rtol=1e-6, atol=1e-7
     )
 
 
 @pytest.mark.parametrize("gait", gaits.names())
 @pytest.mark.parametrize("names", [DEFAULT_SLICES, PAPER_SLICES, DEFAULT_SLICES[::-1]])
 def test_two_mirrors_show_the_observation_itself(gait, names):
-    observe = Observation(gaits.load(gait), names)
+    observe = Observation(gaits.load(gait), LEVEL_STANCE, names)
     order, signs = observe.mirror
     seen = np.random.default_rng(0).normal(size=(5, observe.size)).astype(np.float32)
     once = signs * seen[:, order]
@@ -277,7 +293,7 @@ def test_two_mirrors_show_the_observation_itself(gait, names):
 
 def both_sides_of_the_mirror(robot, *, steps, robots=4):
     """Observations (T, N, D) of robots under arbitrary actions, and of their mirror images."""
-    rng, observe = np.random.default_rng(3), Observation(QUICK_TROT)
+    rng, walker = np.random.default_rng(3), walker_of(QUICK_TROT, robot)
     joint_order, joint_signs = (np.array(part) for part in JOINT_MIRROR)
     stance = robot.stance_angles
 
@@ -298,34 +314,23 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
         joint_position=joint_pair(stance + rng.uniform(-0.1, 0.1, (robots, 12))),
         base_velocity_w=pair(velocity, across * velocity),
     )
-    state = pair(np.zeros(robots, dtype=int), np.ones(robots, dtype=int))
-    steps_in_state = np.zeros(2 * robots, dtype=int)
+    state = walker.begin(world.sensed, np.repeat([0, 1], robots))
     action = np.zeros((2 * robots, 12))
     turn, frequency = rng.uniform(-0.5, 0.5, robots), rng.uniform(1.5, 3.0, robots)
-    seen, touch_height = [], last_touch(world.motion)
+    command = Command(
+        forward_speed=np.full(2 * robots, 1.2),
+        yaw_rate=pair(turn, -turn),
+        stride_frequency=pair(frequency, frequency),
+    )
+    seen = []
     for _ in range(steps):
         action = joint_pair(0.8 * action[:robots] + 0.15 * rng.normal(size=(robots, 12)))
-        motion = world.step(stance + robot.action_scale * action)
-        state, changed, *_ = QUICK_TROT.step(state, motion.contact, steps_in_state)
-        steps_in_state = np.where(changed, 0, steps_in_state + 1)
-        touch_height = last_touch(motion, touch_height)
-        situation = Situation(
-            machine_state=state,
-            steps_in_state=steps_in_state,
-            motion=motion,
-            command=Command(
-                forward_speed=np.full(2 * robots, 1.2),
-                yaw_rate=pair(turn, -turn),
-                stride_frequency=pair(frequency, frequency),
-            ),
-            last_action=action,
-            stance=stance,
-            touch_height=touch_height,
-        )
-        seen.append(observe(situation))
+        sensed, _ = world.step(stance + robot.action_scale * action)
+        state, _ = walker.step(state, action, sensed, command)
+        seen.append(walker.observe(state, sensed, command))
     seen = np.stack(seen)
-    order, signs = observe.mirror
-    return signs * seen[:, :robots, order], seen[:, robots:], observe
+    order, signs = walker.observation.mirror
+    return signs * seen[:, :robots, order], seen[:, robots:], walker.observation
 
 
 def test_a_symmetric_robots_mirror_image_walks_as_the_mirrored_observation_says(tmp_path):

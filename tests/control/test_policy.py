@@ -36,7 +36,7 @@ def untrained(seed, *, normalize=True, config=None):
         for parameter in actor.mlp.parameters():
             parameter.normal_(0.0, 0.5)
         if normalize:
-            size = env.observe.size
+            size = env.walker.observation.size
             many = torch.randn(500, size) * torch.linspace(0.1, 4.0, size) + torch.arange(size)
             actor.train()
             actor.obs_normalizer.update(many)
@@ -89,7 +89,7 @@ def test_the_exported_network_is_the_trained_one(tmp_path, robots, normalize):
     env, actor = untrained(1, normalize=normalize)
     path = tmp_path / "policy.onnx"
     export(actor, describe(env, {}), path)
-    size = env.observe.size
+    size = env.walker.observation.size
     observation = np.random.default_rng(0).normal(size=(robots, size)).astype(np.float32)
     if normalize:
         observation = (observation * np.linspace(0.1, 4, size) + np.arange(size)).astype(np.float32)
@@ -107,7 +107,7 @@ def test_the_exported_critic_is_the_trained_one_but_for_half_precision(tmp_path,
     ppo = PpoConfig(hidden=(24, 10), normalize_observations=normalize)
     recipe = Recipe(env=env.config, ppo=ppo, robots=2, steps=2)
     critic = Learner(env, recipe).ppo.critic
-    size = env.observe.size
+    size = env.walker.observation.size
     with torch.no_grad():
         for parameter in critic.mlp.parameters():
             parameter.normal_(0.0, 0.5)
@@ -158,10 +158,10 @@ def test_export_leaves_one_file_and_takes_the_place_of_the_one_before(made, tmp_
 
 def test_the_target_is_the_stance_plus_the_scaled_action(altered):
     loaded = policy.load(altered(action_scale="0.25"))
-    action = np.arange(24.0).reshape(2, 12)
-    stance = np.array(loaded.robot.stance)
-    np.testing.assert_allclose(loaded.target(action)[0, :3] - stance[:3], [0.0, 0.25, 0.5])
-    np.testing.assert_allclose(loaded.target(action)[1, 9:] - stance[9:], [5.25, 5.5, 5.75])
+    action = 0.4 * np.arange(24.0).reshape(2, 12)
+    stance, (_, target) = np.array(loaded.robot.stance), loaded.walker.target(action)
+    np.testing.assert_allclose(target[0, :3] - stance[:3], [0.0, 0.1, 0.2])
+    np.testing.assert_allclose(target[1, 9:] - stance[9:], [2.1, 2.2, 2.3])
 
 
 # What stands beside it --------------------------------------------------------------------------
@@ -225,7 +225,7 @@ def test_the_policy_wants_the_observation_it_was_trained_on(tmp_path):
     export(actor, describe(env, {}), path)
     wanted = policy.load(path).observation
     assert wanted.names == names
-    assert wanted.slices == env.observe.slices
+    assert wanted.slices == env.walker.observation.slices
 
 
 def test_a_policy_runs_where_neither_torch_nor_gymnasium_nor_mujoco_is(made):
@@ -313,7 +313,7 @@ def test_another_format_version_is_refused(altered):
 
 def test_another_robot_is_refused_with_those_there_are(altered):
     line = refusal(altered(robot='"spot"'))
-    assert "robot must be one of anymal_b, got 'spot'" in line
+    assert "of the robot 'spot', not of 'anymal_b'" in line
 
 
 @pytest.mark.parametrize(("name", "text"), [("kp", "81.5"), ("kd", "0.5")])

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from gaitshift.control.observation import last_touch
 from gaitshift.gait import gaits
 from gaitshift.learn.learner import Learner, as_tensors
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
 from symmetric import symmetric_robot
 
@@ -64,7 +63,7 @@ def twins(gait, robot, *, steps=STEPS):
     machine = replace(machine, dwell_range=(4, machine.dwell_range[1]))
     config = EnvConfig(command_interval=10_000)
     env = GaitEnv(machine, flat(20.0, 20.0), 2 * ROBOTS, config=config, robot=robot, threads=1)
-    env.strictness = 0.0
+    env.curriculum = Curriculum(strictness=0.0)
     env.reset(seed=1)
     rng = np.random.default_rng(2)
 
@@ -84,9 +83,9 @@ def twins(gait, robot, *, steps=STEPS):
         joint_position=pair(joints, mirrored_joints(joints)),
         base_velocity_w=pair(velocity, ACROSS * velocity),
     )
-    env._touch_height = last_touch(env.world.motion)
     env._commander.heading = pair(heading, -heading)
-    env._state = pair(np.zeros(ROBOTS, dtype=int), np.full(ROBOTS, MIRRORED[gait][0]))
+    first = pair(np.zeros(ROBOTS, dtype=int), np.full(ROBOTS, MIRRORED[gait][0]))
+    env._state = env.walker.begin(env.world.sensed, first)
     env._commander.command = replace(
         env._commander.command,
         forward_speed=pair(speed, speed),
@@ -95,7 +94,7 @@ def twins(gait, robot, *, steps=STEPS):
     env._update_command()
     seen, rewards, terms, changed = [], [], [], []
     for _ in range(steps):
-        action = stepping(machine, env._state[:ROBOTS], rng)
+        action = stepping(machine, env._state.machine_state[:ROBOTS], rng)
         action = pair(action, mirrored_joints(action))
         observation, reward, terminated, truncated, info = env.step(action)
         if (terminated | truncated).any():
@@ -127,7 +126,7 @@ def test_every_gait_has_a_mirror_image_but_the_one_with_a_leading_side():
 
 def test_the_mirror_image_is_seen_as_the_mirrored_observation_says(walked):
     _, both = walked
-    order, signs = both.env.observe.mirror
+    order, signs = both.env.walker.observation.mirror
     robots, images = both.seen[:, :ROBOTS], both.seen[:, ROBOTS:]
     # Sums taken in another order differ in the last bit, and contacts make more of that: 5e-6.
     np.testing.assert_allclose(signs * robots[:, :, order], images, atol=1e-4)

@@ -18,13 +18,15 @@ from gaitshift.lab.gait_analysis import (
     measure,
     name_gait,
 )
-from gaitshift.lab.gait_analysis.pattern import share_in_order
+from gaitshift.lab.gait_analysis.naming import share_in_order
 from gaitshift.lab.gait_analysis.phase import Phases, axial_of, ideal_of, phase_errors
-from gaitshift.lab.gait_analysis.steps import steady
+from gaitshift.lab.gait_analysis.sample import steady
 from gaitshift.lab.log import Log
-from synthetic import TABLE, contacts, log_of
+from gaitshift.robot.description import ANYMAL_B
+from synthetic import TABLE, contacts, log_of, turned
 
 TROT = gaits.load("trot")
+LIGHT = replace(ANYMAL_B, mass=20.0)
 FREQUENCY = {"walk": 1.25, "three_one": 1.6, "half_bound": 1.4}
 """Cycles a second where 2.5 would be too fast [Hz]."""
 
@@ -42,20 +44,21 @@ def trotting(*, speed: float, period: int, steps: int, fallen_from: int | None) 
     left = (np.arange(steps) % period) < period // 2
     contact = np.zeros((steps, 2, 4), dtype=bool)
     contact[:, 0] = np.where(left[:, None], [1, 0, 0, 1], [0, 1, 1, 0])
-    qpos, qvel = np.zeros((steps, 2, 19)), np.zeros((steps, 2, 18))
-    qpos[..., 2], qpos[..., 3] = 0.45, 1.0
-    qpos[:, 0, 0], qvel[:, 0, 0], qvel[:, 0, 6] = speed * np.arange(steps) / 100, speed, 2.0
-    torque = np.zeros((steps, 2, 12))
-    torque[:, 0, 0] = -30.0
+    position, velocity = np.zeros((steps, 2, 3)), np.zeros((steps, 2, 3))
+    position[..., 2] = 0.45
+    position[:, 0, 0], velocity[:, 0, 0] = speed * np.arange(steps) / 100, speed
+    joint_velocity, torque = np.zeros((steps, 2, 12)), np.zeros((steps, 2, 12))
+    joint_velocity[:, 0, 0], torque[:, 0, 0] = 2.0, -30.0
     fallen = np.zeros((steps, 2), dtype=bool)
     if fallen_from is not None:
         fallen[fallen_from:, 1] = True
     still = np.zeros(steps, dtype=np.int64)
     return log_of(
         contact,
-        qpos=qpos,
-        qvel=qvel,
-        torque=torque,
+        base_position_w=position,
+        velocity_b=velocity,
+        joint_velocity=joint_velocity,
+        joint_torque=torque,
         fallen=fallen,
         machine_state=np.stack([np.where(left, 0, 1), still], axis=1),
         stance_shown=np.stack([still == 0, still == 1], axis=1),
@@ -71,7 +74,7 @@ def test_figures_of_a_perfect_trot_are_those_it_was_made_of():
     Froude number 0.9² / (9.81 · 0.45).
     """
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
-    figures = measure(log, {"trot": TROT}, mass=20.0)
+    figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["survival"] == 0.5
     assert figures["speed_mean"] == pytest.approx(0.9)
     assert [figures["speed_error"], figures["speed_rmse"]] == pytest.approx([0.3, 0.3])
@@ -91,12 +94,12 @@ def test_robots_count_until_their_fall_and_the_warm_up_does_not_count():
     """The still robot is in the mean while it is on its feet: (0.9 + 0) / 2."""
     for fallen_from, mean in ((None, 0.45), (200, 0.9)):
         log = trotting(speed=0.9, period=40, steps=1200, fallen_from=fallen_from)
-        assert measure(log, {"trot": TROT}, mass=20.0)["speed_mean"] == pytest.approx(mean)
+        assert measure(log, {"trot": TROT}, LIGHT)["speed_mean"] == pytest.approx(mean)
 
 
 def test_a_log_shorter_than_the_warm_up_has_no_figures_but_survival_and_line():
     log = trotting(speed=0.9, period=40, steps=150, fallen_from=None)
-    figures = measure(log, {"trot": TROT}, mass=20.0)
+    figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["survival"] == 1.0
     assert figures["speed_mean"] is None
     assert figures["phase"] == figures["clearance"] == [None] * 4
@@ -106,11 +109,10 @@ def test_a_log_shorter_than_the_warm_up_has_no_figures_but_survival_and_line():
 
 def test_drift_is_the_turn_that_was_not_commanded():
     """One robot turns at 0.3 rad/s though told 0.1, another as told: √(0.2²/2), past ± π too."""
-    log = log_of(np.zeros((2200, 2, 4), dtype=bool))
     yaw = np.outer(np.arange(2200) / 100, [0.3, 0.1])
-    log.qpos[..., 3], log.qpos[..., 6] = np.cos(yaw / 2), np.sin(yaw / 2)
-    log.command[..., 1] = 0.1
-    drift = measure(log, {"trot": TROT}, mass=20.0)["heading_drift"]
+    contact = np.zeros((2200, 2, 4), dtype=bool)
+    log = log_of(contact, quaternion=turned(yaw), yaw_rate_command=0.1)
+    drift = measure(log, {"trot": TROT}, LIGHT)["heading_drift"]
     assert drift == pytest.approx(0.2 / np.sqrt(2), rel=1e-3)
 
 
@@ -118,9 +120,9 @@ def test_clearance_is_the_median_of_the_highest_point_of_each_stride():
     """Swings of FL reach 2, 4 and 9 cm in turn; a bounce in between is no swing."""
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
     stride = np.arange(1200) // 40
-    log.clearance[30::40, 0, 0] = np.array([0.02, 0.04, 0.09])[stride[30::40] % 3]
-    log.contact[10:1200:40, 0, 0] = False
-    figures = measure(log, {"trot": TROT}, mass=20.0)
+    log.truth.clearance[30::40, 0, 0] = np.array([0.02, 0.04, 0.09])[stride[30::40] % 3]
+    log.sensed.contact[10:1200:40, 0, 0] = False
+    figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["clearance"][0] == pytest.approx(0.04)
     assert figures["touchdowns_per_cycle"][0] == pytest.approx(2.0)
     assert figures["phase"][1] == pytest.approx(0.5)
@@ -134,7 +136,7 @@ def test_touchdowns_are_held_against_those_the_machine_asks_for():
     log = log_of(
         contact, gaits=("three_one",), machine_state=np.where(first, 0, 1).astype(np.int64)
     )
-    figures = measure(log, {"three_one": machine}, mass=20.0)
+    figures = measure(log, {"three_one": machine}, LIGHT)
     assert figures["touchdowns_per_cycle"] == pytest.approx([1.0] * 4)
 
 
@@ -145,7 +147,7 @@ def test_touchdowns_are_held_against_those_the_machine_asks_for():
 def test_duty_factors_are_those_of_whole_cycles_however_the_log_ends(left_over):
     """With half a cycle left over, 3.5 of them have the one diagonal down for 4 halves of 7."""
     log = trotting(speed=0.9, period=40, steps=200 + 120 + left_over, fallen_from=0)
-    figures = measure(log, {"trot": TROT}, mass=20.0)
+    figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["duty_factor"] == [0.5] * 4
 
 
@@ -153,7 +155,7 @@ def test_feet_of_a_robot_that_walks_no_cycle_are_down_for_their_share_of_the_tim
     contact = np.zeros((400, 1, 4), dtype=bool)
     contact[:, :, 0] = True
     contact[300:, :, 1] = True
-    figures = measure(log_of(contact), {"trot": TROT}, mass=20.0)
+    figures = measure(log_of(contact), {"trot": TROT}, LIGHT)
     assert figures["duty_factor"] == [1.0, 0.5, 0.0, 0.0]
 
 
@@ -376,7 +378,7 @@ def test_other_gaits_have_limits_no_stricter_than_the_first():
 def test_another_gait_than_the_one_in_force_is_not_clean():
     """A perfect pace while the machine is the trot's."""
     contact = contacts(*TABLE["pace"], frequency=2.5)
-    verdict = measure(log_of(contact), {"trot": TROT}, mass=20.0)["verdict"]
+    verdict = measure(log_of(contact), {"trot": TROT}, LIGHT)["verdict"]
     assert verdict["gait"] == "pace"
     assert not verdict["clean"]
     assert {"figure": "phase_error", "foot": "BL"}.items() <= next(

@@ -10,12 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.identification import (
-    Grid,
-    Recording,
+    LabelledRun,
+    ParameterGrid,
     Tally,
     auc,
     choose,
@@ -24,12 +23,13 @@ from gaitshift.lab.identification import (
     false_shifts,
     first_firings,
     poisson,
-    replay,
     rough_ground,
     wilson,
 )
-from gaitshift.shift import Condition, HeightDifference, PlaneResidual, Rule, load_condition
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift import HeightDifference, PlaneResidual, Rule, there_and_back, ways
 from gaitshift.sim.terrain import from_spec, sections_of
+from synthetic import turned
 
 quick = settings(max_examples=40, deadline=None)
 FEET = np.array(
@@ -45,24 +45,30 @@ def recording(rng, steps, robots, *, roughness=0.05, rough_from=None, alive=None
     feet[..., 2] += noise
     at = np.arange(steps)[:, None]
     rough = np.zeros((steps, robots), dtype=bool) if rough_from is None else at >= rough_from
-    return Recording(
-        name="noise",
-        time=PERIOD * np.arange(1, steps + 1),
+    sensed = Proprioception(
         contact=rng.random((steps, robots, 4)) < 0.6,
         foot_position_b=feet,
-        gravity_b=np.tile([0.0, 0.0, -1.0], (steps, robots, 1)),
+        orientation=turned(np.zeros((steps, robots))),
+        has_heading=False,
+        time=PERIOD * np.arange(1, steps + 1),
+        period=PERIOD,
+    )
+    return LabelledRun(
+        name="noise",
+        sensed=sensed,
         rough=np.broadcast_to(rough, (steps, robots)).copy(),
         alive=np.ones((steps, robots), dtype=bool) if alive is None else alive,
         distance=np.tile(PERIOD * np.arange(1, steps + 1)[:, None], (1, robots)),
     )
 
 
-def live(condition, rec, *, shifted):
-    """Step in which each robot first fires when the condition runs as on a robot; T if never."""
-    state, first = condition.start(rec.robots), np.full(rec.robots, len(rec.time))
-    for t, signals in enumerate(rec):
-        state, fire = condition.step(state, signals, np.full(rec.robots, shifted))
-        newly = fire & (first == len(rec.time)) & rec.alive[t]
+def live(graph, rec, *, shifted):
+    """Step in which each robot first shifts when the graph runs as on a robot; T if never."""
+    state, first = graph.begin(rec.robots), np.full(rec.robots, len(rec.time))
+    state = replace(state, gait=np.full(rec.robots, int(shifted)))
+    for t, sensed in enumerate(rec):
+        state, decision = graph.step(state, sensed)
+        newly = decision.fired & (first == len(rec.time)) & rec.alive[t]
         first[newly] = t
     return first
 
@@ -83,16 +89,11 @@ def test_a_replay_fires_in_the_very_step_in_which_the_robot_did(leak, shifted, s
     first = first_firings(rec.values(statistic), rec.alive, rule, alphas, betas)
     for a, alpha in enumerate(alphas):
         for b, beta in enumerate(betas):
-            condition = Condition(
-                statistic=statistic,
-                alpha=alpha,
-                beta=beta,
-                leak=leak,
-                alpha_back=alpha,
-                beta_back=beta,
-                leak_back=leak,
+            there, back = (
+                Rule(when=when, alpha=alpha, beta=beta, leak=leak) for when in ("above", "below")
             )
-            np.testing.assert_array_equal(first[:, a, b], live(condition, rec, shifted=shifted))
+            graph = there_and_back(statistic, there, back)
+            np.testing.assert_array_equal(first[:, a, b], live(graph, rec, shifted=shifted))
     assert (first == 150).any()
     if leak < 1 or (rule.when == "above" and statistic.width > 1):  # else k never rises
         assert first.min() < 60
@@ -195,18 +196,20 @@ def test_a_name_that_is_none_is_refused():
 
 
 def test_signals_of_a_recording_are_its_rows():
-    rec = replace(recording(np.random.default_rng(2), 3, 2), yaw=np.arange(6.0).reshape(3, 2))
+    plain, yaw = recording(np.random.default_rng(2), 3, 2), 0.5 * np.arange(6.0).reshape(3, 2)
+    rec = replace(plain, sensed=replace(plain.sensed, orientation=turned(yaw), has_heading=True))
     rows = list(rec)
     assert [s.time for s in rows] == pytest.approx([0.01, 0.02, 0.03])
     assert rows[1].period == pytest.approx(0.01)
-    np.testing.assert_array_equal(rows[1].yaw, [2.0, 3.0])
-    np.testing.assert_array_equal(rows[2].foot_position_b, rec.foot_position_b[2])
-    assert rows[0].power is None
+    np.testing.assert_allclose(rows[1].yaw, [1.0, 1.5])
+    np.testing.assert_array_equal(rows[2].foot_position_b, rec.sensed.foot_position_b[2])
+    assert [row.has_heading for row in (*rows, *plain)] == [True] * 3 + [False] * 3
+    assert rows[0].joint_torque is None
 
 
 # The choice ---------------------------------------------------------------------------------------
 
-GRID = Grid(alphas=np.array([0.01, 0.03, 0.06]), betas=np.array([10.0, 12.0, 20.0, 40.0]))
+GRID = ParameterGrid(alphas=np.array([0.01, 0.03, 0.06]), betas=np.array([10.0, 12.0, 20.0, 40.0]))
 
 
 def tally(fired, metres, detected=4, came=4):
@@ -235,7 +238,7 @@ def test_the_soonest_of_the_settings_that_keep_still_is_chosen_with_headroom():
 
 def test_a_setting_that_a_little_smaller_alpha_would_spoil_is_passed_over():
     """α 0.03 is quiet, but 0.0295 is not, and lies within a twentieth of it."""
-    grid = Grid(alphas=np.array([0.01, 0.0295, 0.03, 0.032]), betas=np.array([0.0, 1.0]))
+    grid = ParameterGrid(alphas=np.array([0.01, 0.0295, 0.03, 0.032]), betas=np.array([0.0, 1.0]))
     made = Tally(shape=grid.shape)
     made.came[:], made.detected[:], made.km[:] = 4, 4, 2.0
     made.fired[:2], made.metres[:] = 1, np.arange(4.0)[:, None]
@@ -274,13 +277,22 @@ def test_recordings_of_one_kind_of_ground_are_refused(change, message):
         choose({0.0: {"walk": ground}}, GRID)
 
 
+def tally_of(recordings, statistic, rule):
+    """The tally of a rule's firings over all recordings, on `GRID`."""
+    total = Tally(shape=GRID.shape)
+    for one in recordings:
+        values = one.values(statistic)
+        total.add(one, first_firings(values, one.alive, rule, GRID.alphas, GRID.betas))
+    return total
+
+
 def test_tallies_of_parts_are_the_tally_of_the_whole():
     rng, statistic, rule = np.random.default_rng(4), HeightDifference(), Rule(alpha=1.0, beta=1.0)
     recordings = [recording(rng, 120, 3, rough_from=60) for _ in range(3)]
-    whole = replay(recordings, statistic, rule, GRID)["noise"]
+    whole = tally_of(recordings, statistic, rule)
     parts = Tally(shape=GRID.shape)
     for one in recordings:
-        parts.join(replay([one], statistic, rule, GRID)["noise"])
+        parts.join(tally_of([one], statistic, rule))
     for name in ("came", "detected", "seconds", "metres", "fired", "km"):
         np.testing.assert_allclose(getattr(parts, name), getattr(whole, name))
     assert (parts.robots, whole.robots) == (9, 9)
@@ -290,25 +302,27 @@ def test_tallies_of_parts_are_the_tally_of_the_whole():
 
 @pytest.fixture(scope="module")
 def demo():
-    """Two robots over 3 m of noise between level ground, and the condition they shifted by."""
+    """Two robots over 3 m of noise between level ground, and the graph they shifted by."""
     config = DemoConfig(track="flat@3,perlin:0.12@5,slope:5@3", episodes=2, beta=60.0)
-    policies = {gait: policy.load(gait) for gait in config.used}
-    log, _ = run_demo(config, policies)
-    return log, load_condition(config.condition, beta=60.0)
+    log, _ = run_demo(config)
+    return log, config.ways
 
 
 def test_noise_is_rough_and_level_ground_and_slopes_are_not(demo):
     log, _ = demo
-    x = log.qpos[..., 0]
+    x = log.truth.base_position_w[..., 0]
     np.testing.assert_array_equal(rough_ground(log), (x >= 3.0) & (x < 8.0))
     assert x.max() > 9.0, "a slope was walked on"
 
 
 def test_a_log_replayed_shifts_in_the_step_in_which_the_robots_did(demo):
-    log, condition = demo
-    rec = Recording.from_log(log, "demo", rough_ground(log))
-    at = (np.array([condition.alpha]), np.array([condition.beta]))
-    first = first_firings(rec.values(condition.statistic), rec.alive, condition.rough, *at)
+    log, graph = demo
+    rec = LabelledRun.from_log(log, "demo", rough_ground(log))
+    there, _ = ways(graph)
+    assert there.rule.beta == 60.0
+    at = (np.array([there.rule.alpha]), np.array([there.rule.beta]))
+    values = rec.values(graph.statistics[there.statistic])
+    first = first_firings(values, rec.alive, there.rule, *at)
     shifted = log.gait != log.gait[0]
     assert shifted.any(axis=0).all()
     np.testing.assert_array_equal(first[:, 0, 0], shifted.argmax(axis=0))
@@ -316,13 +330,15 @@ def test_a_log_replayed_shifts_in_the_step_in_which_the_robots_did(demo):
 
 def test_signals_of_a_log_are_those_that_robots_had(demo):
     log, _ = demo
-    rec = Recording.from_log(log, "demo", rough_ground(log))
-    np.testing.assert_allclose(np.linalg.norm(rec.gravity_b, axis=2), 1.0)
+    rec = LabelledRun.from_log(log, "demo", rough_ground(log))
+    # Logs are in single precision.
+    np.testing.assert_allclose(np.linalg.norm(rec.sensed.gravity_b, axis=2), 1.0, rtol=1e-5)
     # Feet are as far from the base whatever frame they are seen in.
-    feet = log.foot_position_w - log.qpos[:, :, None, :3]
+    base = log.truth.base_position_w
+    feet = log.truth.foot_position_w - base[:, :, None]
     np.testing.assert_allclose(
-        np.linalg.norm(rec.foot_position_b, axis=3), np.linalg.norm(feet, axis=3), atol=1e-5
+        np.linalg.norm(rec.sensed.foot_position_b, axis=3), np.linalg.norm(feet, axis=3), atol=1e-5
     )
-    way = log.qpos[..., 0] - log.qpos[0, :, 0]
+    way = base[..., 0] - base[0, :, 0]
     assert (rec.distance >= way - 1e-3).all(), "a way is no shorter than the straight line"
     assert (rec.distance <= 1.1 * way + 0.2).all()

@@ -9,56 +9,21 @@ import pytest
 
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import Recording, auc, sources
+from gaitshift.lab.identification import auc, log_files
 from gaitshift.lab.identification.candidates import CANDIDATES
 from gaitshift.lab.identification.classifier import RoughnessClassifier
 from gaitshift.lab.identification.judging import judge, replay_rules
 from gaitshift.lab.identification.passage import passage_scores
 from gaitshift.lab.identification.statistics import auc_interval
 from gaitshift.lab.identification.tuning import as_given, try_grids, tune
-from gaitshift.robot.legs import LEGS
 from gaitshift.shift import Rule
-
-PERIOD = 0.01
-FEET = np.array(
-    [[0.34, 0.21, -0.5], [0.34, -0.21, -0.5], [-0.34, 0.21, -0.5], [-0.34, -0.21, -0.5]]
-)
+from marches import march, table
 
 
-def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
-    """Robots that trot at 1 m/s; from 4 s on the ground under each touch is off by ± noise [m].
-
-    On smooth ground by ± 1 mm, so that no two touches are level.
-    """
-    rng = np.random.default_rng(seed)
-    steps = round(seconds / PERIOD)
-    time = PERIOD * np.arange(1, steps + 1)
-    rough = np.broadcast_to((time > smooth)[:, None], (steps, robots))
-    if noise == 0.0:
-        rough = np.zeros_like(rough)
-    contact = np.empty((steps, robots, 4), dtype=bool)
-    feet = np.empty((steps, robots, 4, 3))
-    for robot in range(robots):
-        for leg in range(4):
-            phase = (time / 0.5 + (0.5 if leg in (1, 2) else 0.0) + 0.1 * robot) % 1.0
-            down = phase < 0.5
-            stride = np.cumsum(np.diff(down.astype(int), prepend=0) == 1)
-            level = rng.choice((-1.0, 1.0), stride[-1] + 1)
-            size = np.where(rough[:, robot], noise, 0.001)
-            contact[:, robot, leg] = down
-            feet[:, robot, leg] = FEET[leg]
-            feet[:, robot, leg, 0] += np.where(down, 0.25 - phase * 0.5, 0.0)
-            feet[:, robot, leg, 2] += np.where(down, level[stride] * size, 0.1)
-    return Recording(
-        name=name,
-        time=time,
-        contact=contact,
-        foot_position_b=feet,
-        gravity_b=np.tile([0.0, 0.0, -1.0], (steps, robots, 1)),
-        rough=rough.copy(),
-        alive=np.ones((steps, robots), dtype=bool),
-        distance=np.tile(time[:, None], (1, robots)),
-    )
+def backwards(run):
+    """The same steps from the last to the first."""
+    sensed = replace(run.sensed[::-1], time=run.sensed.time)
+    return replace(run, sensed=sensed, rough=run.rough[::-1].copy())
 
 
 def tuned_by(candidates, recordings, way):
@@ -142,13 +107,8 @@ def test_numbers_that_are_given_are_judged_as_those_that_are_chosen():
 
 
 def test_the_way_back_notices_that_rough_ground_has_ended():
-    ahead = march("out-of", noise=0.04, seed=2)
-    turned = {
-        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
-    }
-
     def out():
-        return [replace(ahead, **turned)]
+        return [backwards(march("out-of", noise=0.04, seed=2))]
 
     (tuned,) = tuned_by(height_candidates()[:1], out(), way="flat")
     assert tuned.rule.when == "below"
@@ -158,13 +118,8 @@ def test_the_way_back_notices_that_rough_ground_has_ended():
 
 
 def test_on_the_way_back_an_oracle_notices_the_very_step_in_which_rough_ground_ends():
-    ahead = march("out-of", noise=0.04, seed=2)
-    turned = {
-        name: getattr(ahead, name)[::-1].copy() for name in ("contact", "foot_position_b", "rough")
-    }
-
     def out():
-        return [replace(ahead, **turned)]
+        return [backwards(march("out-of", noise=0.04, seed=2))]
 
     tuned = tuned_by([c for c in CANDIDATES if c.name == "oracle"], out(), way="flat")
     (judged,) = judged_by(tuned, out())
@@ -206,26 +161,6 @@ def test_the_interval_of_an_area_is_wide_where_trials_are_few():
 # The commands -------------------------------------------------------------------------------------
 
 
-def table(path, recording):
-    """Robot 0 of a recording as a CSV file."""
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        head = ["time", "rough", "roll", "pitch", *(f"contact_{leg}" for leg in LEGS)]
-        rows.writerow([*head, *(f"foot_{leg}_{axis}" for leg in LEGS for axis in "xyz")])
-        for t in range(len(recording.time)):
-            rows.writerow(
-                [
-                    f"{recording.time[t]:.2f}",
-                    int(recording.rough[t, 0]),
-                    0.0,
-                    0.0,
-                    *recording.contact[t, 0].astype(int),
-                    *recording.foot_position_b[t, 0].ravel(),
-                ]
-            )
-    return path
-
-
 def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
     logs = [
         str(table(tmp_path / f"walk{seed}.csv", march("into", noise=0.04, robots=1, seed=seed)))
@@ -260,7 +195,7 @@ def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
     assert (row["alpha"], row["beta"], row["leak"], row["keeps_still"]) == (0.2, 1000.0, 0.0, None)
     assert (row["came"], row["detected"]) == (1, 0)
     readme = (tmp_path / "report" / "README.md").read_text()
-    assert "at the numbers that were given" in readme
+    assert "with the given α, β and leak" in readme
     assert "same logs" not in readme
 
 
@@ -271,7 +206,7 @@ def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
         (["nowhere.npz"], "no log file nowhere.npz"),
         (["README.md"], ".npz"),
         (["{log}", "--condition", "guess"], "got 'guess'"),
-        (["{log}", "--condition", "slip"], "lack signals"),
+        (["{log}", "--condition", "slip"], "lack the signals"),
         (["{smooth}"], "must contain rough ground"),
         (["{log}", "--alpha", "0.2"], "--beta"),
         (["{log}", "--leak", "1"], "--alpha and --beta"),
@@ -315,7 +250,7 @@ def replayed_logs(monkeypatch, killed_at=None):
             if len(seen) == killed_at:
                 raise KeyboardInterrupt
             seen.append(path.stem)
-        return sources.recordings(paths, way)
+        return log_files.recordings(paths, way)
 
     monkeypatch.setattr("gaitshift.lab.identification.task.recordings", reading)
     return seen

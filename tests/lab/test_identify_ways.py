@@ -10,8 +10,6 @@ from matplotlib.image import imread
 from test_identify import (
     height_candidates,
     judged_by,
-    march,
-    table,
     time_to_fire,
     tuned_by,
     ways,
@@ -19,10 +17,10 @@ from test_identify import (
 
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import Grid, Tally, choose, passages
+from gaitshift.lab.identification import ParameterGrid, Tally, choose, passages
 from gaitshift.lab.identification.candidates import BETAS, CANDIDATES
 from gaitshift.lab.identification.chatter import chattered, shifts
-from gaitshift.lab.identification.facing import facing
+from gaitshift.lab.identification.ground import align_to_entry
 from gaitshift.lab.identification.passage import best_beta, passage_grid, passage_scores
 from gaitshift.lab.identification.report import (
     condition_cells,
@@ -32,27 +30,33 @@ from gaitshift.lab.identification.report import (
     introduction,
 )
 from gaitshift.lab.identification.tuning import as_given
+from gaitshift.robot.state import Proprioception
 from gaitshift.shift import (
-    Condition,
+    GaitGraph,
     HeightDifference,
     Oracle,
     PlaneResidual,
     Rule,
-    load_condition,
+    load_graph,
+    there_and_back,
 )
+from gaitshift.shift import ways as edges_of
 from gaitshift.show.plots.identification import condition_map, roc_figure
+from marches import march, table
 
 
 def crossing(noise=0.04, *, seed=2, robots=3, name="crossing"):
     """Robots that walk 4 m of smooth ground, 4 m of noise, and 6 m of smooth ground at 1 m/s."""
     into = march(name, noise=noise, seconds=8.0, seed=seed, robots=robots)
     after = march(name, noise=0.0, seconds=6.0, seed=seed + 50, robots=robots)
-    rows = {
-        field: np.concatenate([getattr(into, field), getattr(after, field)])
-        for field in ("contact", "foot_position_b", "gravity_b", "rough", "alive")
-    }
     time = 0.01 * np.arange(1, 1401)
-    return replace(into, time=time, distance=np.tile(time[:, None], (1, robots)), **rows)
+    return replace(
+        into,
+        sensed=replace(Proprioception.stack([*into, *after]), time=time),
+        rough=np.concatenate([into.rough, after.rough]),
+        alive=np.concatenate([into.alive, after.alive]),
+        distance=np.tile(time[:, None], (1, robots)),
+    )
 
 
 def only(name):
@@ -68,30 +72,30 @@ def test_on_the_way_to_flat_ground_each_robot_begins_where_it_comes_to_rough_gro
     rec.rough[:, 2] = False  # never comes to it
     rec.alive[600:, 3] = False
     values = np.arange(1400.0)[:, None, None] * np.ones((1, 4, 1))
-    seen, faced = facing(rec, values, "flat")
+    seen, aligned = align_to_entry(rec, values, "flat")
     assert seen.rough[:, 0].tolist() == [False] * 400 + [True] * 1000
     assert seen.rough[:400, 1].tolist() == [False] * 350 + [True] * 50
     assert seen.alive.sum(axis=0).tolist() == [1000, 950, 0, 200]
     np.testing.assert_allclose(seen.distance[[0, 100], 0], [0.0, 1.0])
     np.testing.assert_allclose(seen.distance[[0, 100], 1], [0.0, 1.0])
-    assert faced[[0, 10], :2, 0].tolist() == [[400.0, 450.0], [410.0, 460.0]]
+    assert aligned[[0, 10], :2, 0].tolist() == [[400.0, 450.0], [410.0, 460.0]]
 
 
 def test_on_the_way_to_rough_ground_each_robot_begins_where_it_first_walks_on_smooth_ground():
     """What it starts on it has not come to; rough ground alone counts as it is."""
     rec = crossing(robots=4)
     values = np.arange(1400.0)[:, None, None] * np.ones((1, 4, 1))
-    assert facing(rec, values, "rough")[0] is rec, "all start on smooth ground"
+    assert align_to_entry(rec, values, "rough")[0] is rec, "all start on smooth ground"
     rec.rough[:300, 1] = True
     rec.rough[:, 2] = True
     rec.alive[600:, 1] = False
-    seen, faced = facing(rec, values, "rough")
+    seen, aligned = align_to_entry(rec, values, "rough")
     assert seen.rough[:, 0].tolist() == rec.rough[:, 0].tolist()
     assert seen.rough[:600, 1].tolist() == [False] * 100 + [True] * 400 + [False] * 100
     assert seen.rough[:, 2].all()
     assert seen.alive.sum(axis=0).tolist() == [1400, 300, 1400, 1400]
     np.testing.assert_allclose(seen.distance[[0, 100], 1], [0.0, 1.0])
-    assert faced[[0, 10], 1, 0].tolist() == [300.0, 310.0]
+    assert aligned[[0, 10], 1, 0].tolist() == [300.0, 310.0]
 
 
 def test_rough_ground_that_a_table_begins_on_was_not_come_to(tmp_path):
@@ -136,10 +140,9 @@ def test_the_numbers_of_a_crossing_are_those_of_the_same_robots_from_the_noise_o
     whole = crossing()
     late = replace(
         whole,
-        **{
-            field: getattr(whole, field)[400:]
-            for field in ("time", "contact", "foot_position_b", "gravity_b", "rough", "alive")
-        },
+        sensed=whole.sensed[400:],
+        rough=whole.rough[400:],
+        alive=whole.alive[400:],
         distance=whole.distance[400:] - whole.distance[400],
     )
     (first, second) = (tuned_by(only("oracle"), [r], way="flat") for r in (whole, late))
@@ -162,7 +165,7 @@ def test_identify_finds_the_way_back_in_a_table_of_smooth_rough_and_smooth_groun
     assert "Passages of level ground" in (out / "page.html").read_text()
 
 
-GRID = Grid(alphas=np.array([0.01, 0.03, 0.0305, 0.06]), betas=np.array([0.0, 1.0]))
+GRID = ParameterGrid(alphas=np.array([0.01, 0.03, 0.0305, 0.06]), betas=np.array([0.0, 1.0]))
 
 
 def test_the_headroom_of_the_way_back_lies_at_a_larger_alpha():
@@ -264,7 +267,7 @@ def test_passages_are_scored_at_the_beta_that_tells_them_apart_best():
     (row,) = condition_rows([judged])
     assert (row["area"], row["area_beta"]) == (min(told), tuned.area_beta)
     assert condition_cells(row)[-1] == f"{tuned.area_beta:g}"
-    assert "told passages apart best on the logs that chose" in introduction([judged], True)[1]
+    assert "the β with the largest area on the logs for choosing" in introduction([judged], True)[1]
 
 
 @pytest.mark.parametrize(("beta", "is_told"), [(1793.0, True), (1801.0, False)])
@@ -285,20 +288,20 @@ def test_an_area_is_told_only_where_a_passage_is_long_enough_for_beta(beta, is_t
 
 
 @pytest.mark.parametrize("statistic_back", [None, PlaneResidual()])
-def test_shifts_there_and_back_are_those_of_a_live_condition(statistic_back):
+def test_shifts_there_and_back_are_those_of_a_live_graph(statistic_back):
     rec = crossing(noise=0.02)
     rec.alive[1000:, 2] = False
-    condition = Condition(
-        alpha=0.02, beta=9.0, leak=0.3, alpha_back=0.03, beta_back=12.0, leak_back=0.1,
+    graph = there_and_back(
+        HeightDifference(),
+        Rule(alpha=0.02, beta=9.0, leak=0.3),
+        Rule(when="below", alpha=0.03, beta=12.0, leak=0.1),
         statistic_back=statistic_back,
-    )  # fmt: skip
-    state, shifted = condition.start(3), np.zeros(3, dtype=bool)
-    expected = np.zeros(3, dtype=int)
-    for t, signals in enumerate(rec):
-        state, fires = condition.step(state, signals, shifted)
-        shifted = shifted ^ fires
-        expected += fires & rec.alive[t]
-    np.testing.assert_array_equal(shifts(rec, condition), expected)
+    )
+    state, expected = graph.begin(3), np.zeros(3, dtype=int)
+    for t, sensed in enumerate(rec):
+        state, decision = graph.step(state, sensed)
+        expected += decision.fired & rec.alive[t]
+    np.testing.assert_array_equal(shifts(rec, graph), expected)
     assert expected.min() > 2, "they chatter"
 
 
@@ -315,25 +318,30 @@ def test_chatter_is_more_than_once_there_and_once_back_for_each_rough_stretch():
 
 @pytest.mark.parametrize("way", ["rough", "flat"])
 def test_the_report_counts_chatter_with_the_shipped_way_back_or_there(way):
-    """An oracle on one way, and on the other the shipped condition, live."""
+    """An oracle on one way, and on the other the default graph's edge, live."""
     rec = crossing()
     (judged,) = judged_by(as_given(only("oracle"), way=way, alpha=0.5, beta=0.0), [rec])
     (row,) = course_rows([judged])
-    condition = load_condition("touchdown_surprise")
+    shipped = load_graph("terrain")
+    statistics, (there, back) = shipped.statistics, edges_of(shipped)
     if way == "rough":
-        condition = replace(condition, statistic=Oracle(), alpha=0.5, beta=0.0)
+        there = replace(there, statistic="oracle", rule=Rule(alpha=0.5, beta=0.0))
     else:
-        back = {"alpha_back": 0.5, "beta_back": 0.0, "leak_back": 0.0}
-        condition = replace(condition, statistic_back=Oracle(), **back)
-    state, shifted, count = condition.start(3), np.zeros(3, dtype=bool), np.zeros(3, dtype=int)
-    for signals in rec:
-        state, fires = condition.step(state, signals, shifted)
-        shifted, count = shifted ^ fires, count + fires
+        back = replace(back, statistic="oracle", rule=Rule(when="below", alpha=0.5, beta=0.0))
+    graph = GaitGraph(
+        start=shipped.start,
+        statistics={**statistics, "oracle": Oracle()},
+        edges=(there, back),
+    )
+    state, count = graph.begin(3), np.zeros(3, dtype=int)
+    for sensed, rough in zip(rec, rec.rough, strict=True):
+        state, decision = graph.step(state, sensed, rough)
+        count += decision.fired
     assert count.min() >= 2
     assert (row["shifts"], row["chattered"]) == (count.sum(), (count > 2).sum())
     assert f"{row['chattered']} of 3" in course_cells(row)
     words = introduction([judged], True)[1]
-    assert f"the shipped way {'back' if way == 'rough' else 'there'} (touchdown_surprise's" in words
+    assert f"default graph's rule for the way {'back' if way == 'rough' else 'there'} (α" in words
 
 
 def test_a_rule_without_patience_chatters_on_rough_ground():
@@ -375,7 +383,8 @@ def test_columns_that_a_condition_needs_are_named(tmp_path, capsys, log, more):
 
 
 def test_only_the_columns_that_are_missing_are_named(tmp_path):
-    rec = replace(march("walk", noise=0.04), velocity_b=np.zeros((1200, 3, 3)))
+    rec = march("walk", noise=0.04)
+    rec = replace(rec, sensed=replace(rec.sensed, velocity_b=np.zeros((1200, 3, 3))))
     with pytest.raises(GaitshiftError, match=r"needs angular_velocity_x, [a-z_, ]*_z$"):
         tuned_by(only("slip"), [rec], way="rough")
 
@@ -406,7 +415,10 @@ def test_no_recordings_at_all_are_refused():
 
 def test_a_map_tells_beta_in_the_time_of_the_logs(tmp_path):
     """Of logs at 50 Hz, twice the time that the rule takes at 100 Hz; six numbers count a step."""
-    slow = [replace(way, time=2 * way.time) for way in ways()]
+    slow = [
+        replace(way, sensed=replace(way.sensed, time=2 * way.time, period=2 * way.period))
+        for way in ways()
+    ]
     (tuned,) = tuned_by(height_candidates()[:1], slow, way="rough")
     tuned = replace(tuned, choice=replace(tuned.choice, beta=37.0, leak=1.2))
     (judged,) = judged_by([tuned], slow)

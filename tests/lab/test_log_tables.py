@@ -7,9 +7,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification import passages, table
-from gaitshift.robot.legs import LEGS
+from gaitshift.lab.identification import log_files, passages
+from gaitshift.robot.legs import JOINTS, LEGS
 
 FEET = np.array(
     [[0.34, 0.21, -0.5], [0.35, -0.22, -0.5], [-0.33, 0.23, -0.5], [-0.36, -0.24, -0.5]]
@@ -28,7 +29,8 @@ def columns():
         for axis in range(3):
             data[f"foot_{name}_{'xyz'[axis]}"] = FEET[leg, axis] - 0.01 * at * heading[axis]
     data["rough"] = ((at >= 20) & (at < 40)).astype(int)
-    data["power"] = 100.0 + at
+    data["velocity_x"], data["velocity_y"], data["velocity_z"] = 100.0 + at, 0.0 * at, 0.0 * at
+    data["value"] = 10.0 + at
     data["temperature"] = [f"{t} degrees" for t in at]
     return data
 
@@ -56,9 +58,30 @@ def test_a_table_becomes_passages_of_smooth_ground_and_the_rough_behind_it(
     assert [len(one.time) for one in read] == [40, 20]
     assert read[0].rough[:, 0].tolist() == [False] * 20 + [True] * 20
     assert not read[1].rough.any()
-    power = np.concatenate([one.power[:, 0] for one in read])
-    np.testing.assert_allclose(power, 100.0 + np.arange(ROWS))
-    assert read[0].yaw is None
+    speed = np.concatenate([one.sensed.forward_speed[:, 0] for one in read])
+    np.testing.assert_allclose(speed, 100.0 + np.arange(ROWS))
+    value = np.concatenate([one.sensed.value[:, 0] for one in read])
+    np.testing.assert_allclose(value, 10.0 + np.arange(ROWS))
+    assert not read[0].sensed.has_heading
+    assert read[0].sensed.joint_torque is None
+    assert read[0].period == pytest.approx(0.01)
+
+
+def test_heading_joints_and_commands_are_read_from_columns_of_their_names(tmp_path):
+    """Power is the sum of |torque · velocity| of the joints: 2 N·m at 0 to 11 rad/s."""
+    data, joints = columns(), [f"{leg}_{joint}" for leg in LEGS for joint in JOINTS]
+    for index, joint in enumerate(joints):
+        data[f"joint_torque_{joint}"] = np.full(ROWS, -2.0)
+        data[f"joint_velocity_{joint}"] = np.full(ROWS, float(index))
+    data["yaw"] = 0.01 * np.arange(ROWS)
+    data["speed_command"], data["stride_frequency"] = np.full(ROWS, 0.8), np.full(ROWS, 2.5)
+    (first, _) = passages(written(tmp_path, data))
+    np.testing.assert_allclose(first.sensed.power, 2.0 * sum(range(12)))
+    np.testing.assert_allclose(first.sensed.joint_velocity[3, 0], np.arange(12.0))
+    assert first.sensed.has_heading
+    np.testing.assert_allclose(first.sensed.yaw[:, 0], data["yaw"][:40], atol=1e-9)
+    assert (first.sensed.forward_speed_command == 0.8).all()
+    assert (first.sensed.stride_frequency_command == 2.5).all()
 
 
 def test_roll_and_pitch_are_the_direction_of_gravity(tmp_path):
@@ -68,7 +91,7 @@ def test_roll_and_pitch_are_the_direction_of_gravity(tmp_path):
     about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
     about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     expected = np.array([0.0, 0.0, -1.0]) @ about_y @ about_x
-    np.testing.assert_allclose(first.gravity_b[7, 0], expected)
+    np.testing.assert_allclose(first.sensed.gravity_b[7, 0], expected)
 
 
 def test_gravity_may_be_given_at_any_length(tmp_path):
@@ -77,7 +100,7 @@ def test_gravity_may_be_given_at_any_length(tmp_path):
     for axis, value in zip("xyz", (0.0, 3.0, -4.0), strict=True):
         data[f"gravity_{axis}"] = np.full(ROWS, 9.81 / 5 * value)
     (first, _) = passages(written(tmp_path, data))
-    np.testing.assert_allclose(first.gravity_b[3, 0], [0.0, 0.6, -0.8])
+    np.testing.assert_allclose(first.sensed.gravity_b[3, 0], [0.0, 0.6, -0.8], atol=1e-9)
 
 
 def test_the_way_is_that_of_leg_odometry(tmp_path):
@@ -86,7 +109,7 @@ def test_the_way_is_that_of_leg_odometry(tmp_path):
 
 
 def test_a_stretch_that_is_too_long_is_cut(tmp_path, monkeypatch):
-    monkeypatch.setattr(table, "LONGEST", 15)
+    monkeypatch.setattr(log_files, "LONGEST", 15)
     lengths = [len(one.time) for one in passages(written(tmp_path, columns()))]
     assert lengths == [15, 15, 10, 15, 5]
 
@@ -113,9 +136,9 @@ def test_a_single_row_at_a_border_is_no_passage(tmp_path):
 
 def test_whole_numbers_are_numbers(tmp_path):
     """Nanoseconds since 1970 pass 2^53, and are no seconds: that is what is said of them."""
-    data = columns() | {"power": 2**60 + np.arange(ROWS)}
+    data = columns() | {"value": 2**60 + np.arange(ROWS)}
     (first, _) = passages(written(tmp_path, data, "parquet"))
-    assert first.power[0, 0] == 2.0**60
+    assert first.sensed.value[0, 0] == 2.0**60
     data["time"] = 1_700_000_000_000_000_000 + 10_000_000 * np.arange(ROWS)
     with pytest.raises(GaitshiftError, match=r"apart in 'time', got 1e\+07; the unit is seconds"):
         list(passages(written(tmp_path, data, "parquet")))
@@ -123,16 +146,16 @@ def test_whole_numbers_are_numbers(tmp_path):
 
 def test_contacts_and_labels_may_be_true_and_false(tmp_path):
     data = columns()
-    for name in (*table.CONTACTS, "rough"):
+    for name in (*log_files.CONTACTS, "rough"):
         data[name] = [str(bool(value)).lower() for value in data[name]]
     (plain, _), (words, _) = (passages(written(tmp_path, d)) for d in (columns(), data))
-    np.testing.assert_array_equal(words.contact, plain.contact)
+    np.testing.assert_array_equal(words.sensed.contact, plain.sensed.contact)
     np.testing.assert_array_equal(words.rough, plain.rough)
 
 
 def test_a_parquet_column_of_words_is_named(tmp_path):
-    data = columns() | {"power": [f"{t} W" for t in range(ROWS)]}
-    with pytest.raises(GaitshiftError, match="column 'power' must hold numbers"):
+    data = columns() | {"value": [f"{t} points" for t in range(ROWS)]}
+    with pytest.raises(GaitshiftError, match="column 'value' must hold numbers"):
         list(passages(written(tmp_path, data, "parquet")))
 
 
@@ -140,7 +163,7 @@ def test_what_stands_in_other_columns_does_not_matter(tmp_path):
     data = columns()
     del data["temperature"]
     (plain, _), (other, _) = (passages(written(tmp_path, d)) for d in (data, columns()))
-    np.testing.assert_array_equal(plain.foot_position_b, other.foot_position_b)
+    np.testing.assert_array_equal(plain.sensed.foot_position_b, other.sensed.foot_position_b)
 
 
 def without(name):
@@ -183,7 +206,7 @@ def all_of(names, value):
             "lacks the attitude; a table needs gravity_x, _y, _z, or roll and pitch",
         ),
         (at_row("foot_FR_y", 33, np.nan), "row 34, 'foot_FR_y' must be a finite number"),
-        (at_row("power", 5, "much"), "cannot be read as csv"),
+        (at_row("value", 5, "much"), "cannot be read as csv"),
         (at_row("time", 30, 5.29), "row 31, 'time' must rise"),
         (at_row("time", 30, 5.1), "row 31, 'time' must rise"),
         (
@@ -219,7 +242,7 @@ def test_a_faulty_table_is_named_with_its_row_or_column(tmp_path, change, messag
         ("empty.csv", b"", "cannot be read as csv"),
         (
             "head.csv",
-            ("time," + ",".join(table.REQUIRED[1:]) + ",roll,pitch\n").encode(),
+            ("time," + ",".join(log_files.REQUIRED[1:]) + ",roll,pitch\n").encode(),
             "must have two rows or more, .*got 0",
         ),
         ("noise.parquet", b"\x00\x01 this is none", "cannot be read as parquet"),

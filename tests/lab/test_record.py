@@ -9,6 +9,7 @@ import pytest
 
 import gaitshift.control.policies
 from gaitshift.cli import main
+from gaitshift.control.cpg.gait import GAITS
 from gaitshift.lab.log import Log
 
 TROT = Path(gaitshift.control.policies.__path__[0]) / "trot.onnx"
@@ -41,7 +42,7 @@ def test_a_kept_log_of_other_size_is_refused_before_anything_is_recorded(
     logs = shutil.copytree(recorded, tmp_path / "logs")
     line = refused(capsys, ask(logs, robots, seconds, courses=("up-10", "flat")))
     assert f"{logs / 'trot-flat-0.npz'} has 2 robots × 0.3 s" in line
-    assert f"not {robots} × {seconds:g} s" in line
+    assert f"got {robots} × {seconds:g} s" in line
     assert "--overwrite" in line
     assert [path.name for path in logs.iterdir()] == ["trot-flat-0.npz"]
     main([*ask(logs, robots, seconds), "--overwrite"])
@@ -56,8 +57,32 @@ def test_a_log_that_ended_as_all_robots_had_fallen_is_kept(recorded, tmp_path, c
     replace(log, fallen=fallen).save(path)
     before = path.read_bytes()
     main(ask(path.parent, 2, 8))
-    assert "not recorded again" in capsys.readouterr().err
+    assert "exists, not repeated" in capsys.readouterr().err
     assert path.read_bytes() == before
+
+
+def test_oscillators_are_recorded_at_the_speed_and_stride_of_their_own_gait(tmp_path):
+    gait = GAITS["walk"]
+    numbers = ["--robots", "2", "--seconds", "0.3", "--courses", "flat"]
+    main(["record", "walk", "--controller", "cpg", "--out", str(tmp_path / "logs"), *numbers])
+    log = Log.load(tmp_path / "logs" / "walk-flat-0.npz")
+    assert (log.gaits, log.k.shape) == (("walk",), (30, 2))
+    np.testing.assert_allclose(log.sensed.forward_speed_command, gait.speed)
+    np.testing.assert_allclose(log.sensed.stride_frequency_command, gait.frequency)
+    assert log.sensed.value is None, "oscillators have no critic"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["trot", "--controller", "wheels"], "unknown controller 'wheels'"),
+        (["gallop", "--controller", "cpg"], "gallop"),
+    ],
+)
+def test_a_controller_that_cannot_be_had_is_refused(tmp_path, capsys, arguments, message):
+    line = refused(capsys, ["record", *arguments, "--out", str(tmp_path / "logs")])
+    assert message in line
+    assert not (tmp_path / "logs").exists()
 
 
 def test_two_policies_of_one_gait_are_refused(tmp_path, capsys):

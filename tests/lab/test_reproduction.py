@@ -1,41 +1,26 @@
 """The paper's recipe run again: what each switch changes, what is found, and that it goes on."""
 
-import csv
-import json
-import os
 import re
-import shutil
-import signal
-import subprocess
-import sys
 from dataclasses import asdict, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
-from rsl_rl.algorithms import PPO
 
-from gaitshift.cli import main
 from gaitshift.control.observation import PAPER_SLICES
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.reproduction.courses import Course, median_iteration
 from gaitshift.lab.reproduction.findings import findings
+from gaitshift.lab.reproduction.learning_curve import LearningCurve, median_iteration
 from gaitshift.lab.reproduction.plan import Plan
-from gaitshift.lab.reproduction.pool import train_all
-from gaitshift.lab.reproduction.results import Results, Seeds
+from gaitshift.lab.reproduction.results import EarlierRuns, Results, Seeds
 from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER, REFERENCE
-from gaitshift.lab.reproduction.tables import curve_rows, run_rows, write
-from gaitshift.lab.reproduction.told import Told
-from gaitshift.lab.reproduction.training import FAILED, is_over, train
-from gaitshift.learn.learner import DivergedError
+from gaitshift.lab.reproduction.tables import curve_rows, run_rows
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import Run
 from gaitshift.show.plots.learning import Landmarks, comparison_curves, reward_curves
-from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
-from waiting import PATIENCE, wait_until
+from gaitshift.table import write
 
 CHANGES = {
     "multiply-clipped": {"recipe/env/reward/bonus_mode": "multiply_clipped"},
@@ -118,8 +103,8 @@ def test_a_plan_is_all_settings_gaits_and_seeds_and_parts_can_be_picked():
 def test_the_factor_on_penalties_grows_in_a_straight_line():
     recipe = replace(Recipe.paper(), penalty_start=0.2, penalty_until=100)
     table = {0: 0.2, 25: 0.4, 50: 0.6, 100: 1.0, 101: 1.0, 499: 1.0}
-    assert {i: round(recipe.penalty_scale(i), 9) for i in table} == table
-    assert {Recipe.paper().penalty_scale(i) for i in table} == {1.0}
+    assert {i: round(recipe.curriculum(i).penalty_scale, 9) for i in table} == table
+    assert {Recipe.paper().curriculum(i).penalty_scale for i in table} == {1.0}
 
 
 @pytest.mark.parametrize("start", [-0.1, 1.1])
@@ -133,7 +118,7 @@ def test_the_factor_is_on_the_penalties_and_on_nothing_else():
         config = EnvConfig(command_share=0.0)
         env = GaitEnv(gaits.load("trot"), flat(4.0, 4.0), 5, config=config, threads=1)
         env.reset(seed=3)
-        env.penalty_scale = scale
+        env.curriculum = Curriculum(penalty_scale=scale)
         return env.step(np.random.default_rng(0).normal(size=(5, 12)))[4]["reward_terms"]
 
     whole, quarter = terms(1.0), terms(0.25)
@@ -158,25 +143,25 @@ def test_a_run_that_goes_on_has_the_factor_of_its_iteration(tmp_path):
                 run.train(report)
             run = Run.resume(folder)
         run.train()
-        return [course_of(folder).reward, course_of(folder).speed]
+        return [curve_of(folder).reward, curve_of(folder).speed]
 
     np.testing.assert_array_equal(
         trained(tmp_path / "whole", False), trained(tmp_path / "broken", True)
     )
 
 
-def course_of(folder):
-    return Course.read(folder / "progress.csv")
+def curve_of(folder):
+    return LearningCurve.read(folder / "progress.csv")
 
 
 # Courses and findings ---------------------------------------------------------------------------
 
 
-def course(n=500, *, walks=None, start=-25.0, end=26.0, zero=40, changes=9.5, speed=1.1):
+def curve(n=500, *, walks=None, start=-25.0, end=26.0, zero=40, changes=9.5, speed=1.1):
     """A run that stands, and walks at once from iteration `walks` on."""
     iteration = np.arange(1, n + 1)
     walking = np.zeros(n, dtype=bool) if walks is None else iteration >= walks
-    return Course(
+    return LearningCurve(
         reward=np.where(iteration < zero, start, end),
         speed=np.where(walking, speed, 0.1),
         survival=np.where(walking, 0.97, 0.2),
@@ -185,24 +170,24 @@ def course(n=500, *, walks=None, start=-25.0, end=26.0, zero=40, changes=9.5, sp
     )
 
 
-def seeds(setting, gait, courses, *, broken=0):
+def seeds(setting, gait, curves, *, broken=0):
     plan = Plan()
     jobs = [job for job in plan.jobs if job.setting.name == setting and job.gait == gait]
-    courses = [*courses, *(course(7) for _ in range(broken))]
+    curves = [*curves, *(curve(7) for _ in range(broken))]
     return Seeds(
-        jobs=tuple(jobs[: len(courses)]),
-        courses=tuple(courses),
-        broken=(False,) * (len(courses) - broken) + (True,) * broken,
+        jobs=tuple(jobs[: len(curves)]),
+        curves=tuple(curves),
+        broken=(False,) * (len(curves) - broken) + (True,) * broken,
     )
 
 
 def like_the_paper():
     """Runs that do what the paper says."""
-    courses = {
-        gait: [course(walks=zero + shift, zero=zero) for shift in range(5)]
+    curves = {
+        gait: [curve(walks=zero + shift, zero=zero) for shift in range(5)]
         for gait, zero in (("trot", 38), ("bound", 52), ("pace", 85))
     }
-    return {("paper", gait): seeds("paper", gait, made) for gait, made in courses.items()}
+    return {("paper", gait): seeds("paper", gait, made) for gait, made in curves.items()}
 
 
 def verdicts(table):
@@ -210,15 +195,15 @@ def verdicts(table):
     return {finding.name: finding.verdict for finding in found}
 
 
-def test_landmarks_of_a_course():
-    made = course(100, walks=60, zero=31)
+def test_landmarks_of_a_learning_curve():
+    made = curve(100, walks=60, zero=31)
     made.speed[20:29] = 1.0  # nine in a row are not ten
     made.changes_per_s[20:29] = 5.0
     assert (made.walks_at, made.moves_at, made.crosses_zero_at) == (60, 60, 31)
     made.speed[9:19] = 1.0  # as fast, but its machine stands still
     assert (made.walks_at, made.moves_at) == (60, 10)
-    assert course(100, walks=92).walks_at is None, "too near the end to hold ten times"
-    assert course(100, walks=91).walks_at == 91
+    assert curve(100, walks=92).walks_at is None, "too near the end to hold ten times"
+    assert curve(100, walks=91).walks_at == 91
     assert made.late("speed") == pytest.approx(1.1)
     assert made.cut(50).walks_at is None
 
@@ -246,7 +231,7 @@ def test_runs_that_do_what_the_paper_says_hold():
 
 def test_runs_that_do_not_are_told_apart():
     table = like_the_paper()
-    never = [course(zero=501, start=-8.0) for _ in range(5)]
+    never = [curve(zero=501, start=-8.0) for _ in range(5)]
     table["paper", "trot"] = seeds("paper", "trot", never)
     assert verdicts(table) == {
         "three gaits": "holds in part",
@@ -260,65 +245,65 @@ def test_runs_that_do_not_are_told_apart():
 
 
 @pytest.mark.parametrize(
-    ("setting", "courses", "broken", "group", "verdict"),
+    ("setting", "curves", "broken", "group", "verdict"),
     [
-        ("multiply", [course(300, walks=90)] * 3, 0, "bonus", "holds"),
-        ("multiply", [course(300, walks=90)] * 2, 1, "bonus", "holds in part"),
-        ("multiply", [course(300)] * 3, 0, "bonus", "does not hold"),
-        ("lockout-0", [course(300, walks=30, changes=45.0)] * 3, 0, "lock-out", "does not hold"),
-        ("lockout-0", [course(300, walks=30, changes=5.0)] * 3, 0, "lock-out", "holds"),
-        ("blind", [course(300, walks=42)] * 3, 0, "observation", "does not hold"),
-        ("blind", [course(300, walks=60)] * 3, 0, "observation", "holds"),
-        ("blind", [course(300, walks=20)] * 2, 1, "observation", "holds"),
-        ("no-bonus", [course(300, walks=30, changes=0.0)] * 3, 0, "machine", "does not hold"),
-        ("no-bonus", [course(300)] * 3, 0, "machine", "holds"),
-        ("no-bonus", [course(300, walks=60)] * 3, 0, "machine", "holds in part"),
-        ("curriculum", [course(300, walks=60)] * 3, 0, "penalties", "holds"),
-        ("curriculum", [course(300, walks=38)] * 3, 0, "penalties", "holds in part"),
-        ("curriculum", [course(300, walks=20)] * 3, 0, "penalties", "holds in part"),
-        ("paper-gains", [course(300)] * 3, 0, "gains", "does not hold"),
+        ("multiply", [curve(300, walks=90)] * 3, 0, "bonus", "holds"),
+        ("multiply", [curve(300, walks=90)] * 2, 1, "bonus", "holds in part"),
+        ("multiply", [curve(300)] * 3, 0, "bonus", "does not hold"),
+        ("lockout-0", [curve(300, walks=30, changes=45.0)] * 3, 0, "lock-out", "does not hold"),
+        ("lockout-0", [curve(300, walks=30, changes=5.0)] * 3, 0, "lock-out", "holds"),
+        ("blind", [curve(300, walks=42)] * 3, 0, "observation", "does not hold"),
+        ("blind", [curve(300, walks=60)] * 3, 0, "observation", "holds"),
+        ("blind", [curve(300, walks=20)] * 2, 1, "observation", "holds"),
+        ("no-bonus", [curve(300, walks=30, changes=0.0)] * 3, 0, "machine", "does not hold"),
+        ("no-bonus", [curve(300)] * 3, 0, "machine", "holds"),
+        ("no-bonus", [curve(300, walks=60)] * 3, 0, "machine", "holds in part"),
+        ("curriculum", [curve(300, walks=60)] * 3, 0, "penalties", "holds"),
+        ("curriculum", [curve(300, walks=38)] * 3, 0, "penalties", "holds in part"),
+        ("curriculum", [curve(300, walks=20)] * 3, 0, "penalties", "holds in part"),
+        ("paper-gains", [curve(300)] * 3, 0, "gains", "does not hold"),
         ("paper-gains", [], 3, "gains", "does not hold"),
     ],
 )
-def test_an_ablation_is_judged_by_how_it_learned(setting, courses, broken, group, verdict):
+def test_an_ablation_is_judged_by_how_it_learned(setting, curves, broken, group, verdict):
     table = like_the_paper() | {
-        (setting, "trot"): seeds(setting, "trot", courses, broken=broken),
+        (setting, "trot"): seeds(setting, "trot", curves, broken=broken),
     }
     assert verdicts(table)[group] == verdict
 
 
 def test_an_ablation_that_does_not_decide_gives_no_verdict():
     table = like_the_paper() | {
-        ("lockout-20", "trot"): seeds("lockout-20", "trot", [course(300, walks=30)] * 3),
+        ("lockout-20", "trot"): seeds("lockout-20", "trot", [curve(300, walks=30)] * 3),
     }
     assert "lock-out" not in verdicts(table)
 
 
 def test_an_ablation_is_held_against_as_many_seeds_and_iterations():
-    late = [course(walks=400)] * 3 + [course(walks=38)] * 2
+    late = [curve(walks=400)] * 3 + [curve(walks=38)] * 2
     table = {
         ("paper", "trot"): seeds("paper", "trot", late),
-        ("blind", "trot"): seeds("blind", "trot", [course(300, walks=250)] * 3),
+        ("blind", "trot"): seeds("blind", "trot", [curve(300, walks=250)] * 3),
     }
     (finding,) = findings(Results(plan=Plan(), seeds=table))
     assert "**u and δ shown** 0 of 3 walk (the median never)" in finding.measured
     assert "**u and δ hidden** 3 of 3 walk (median iteration 250)" in finding.measured
 
 
-def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
+def test_a_table_of_curves_reads_back_as_the_curves(tmp_path):
     """Landmarks and findings from the table are those from the runs, digit by digit."""
     table = like_the_paper() | {
-        ("blind", "trot"): seeds("blind", "trot", [course(200, walks=61)] * 2, broken=1),
+        ("blind", "trot"): seeds("blind", "trot", [curve(200, walks=61)] * 2, broken=1),
     }
     first = Results(plan=Plan(), seeds=table)
-    write(run_rows(first), tmp_path / "runs.csv")
-    write(list(curve_rows(first)), tmp_path / "curves.csv")
-    told = Told.read(Plan(), tmp_path)
-    again = Results.read(Plan(), tmp_path / "none", told)
+    write(tmp_path / "runs.csv", run_rows(first))
+    write(tmp_path / "curves.csv", list(curve_rows(first)))
+    earlier = EarlierRuns.read(Plan(), tmp_path)
+    again = Results.read(Plan(), tmp_path / "none", earlier)
     assert findings(again) == findings(first)
     assert list(curve_rows(again)) == list(curve_rows(first))
-    assert told.broken == {"blind-trot-2"}
-    assert again.seeds["paper", "pace"].courses[1].walks_at == 86
+    assert earlier.broken == {"blind-trot-2"}
+    assert again.seeds["paper", "pace"].curves[1].walks_at == 86
 
 
 @pytest.mark.parametrize(
@@ -330,40 +315,42 @@ def test_a_table_of_courses_tells_what_the_courses_told(tmp_path):
     ],
 )
 def test_a_damaged_report_is_named(name, old, new, says, tmp_path):
-    table = {("blind", "trot"): seeds("blind", "trot", [course(200, walks=61)] * 3)}
+    table = {("blind", "trot"): seeds("blind", "trot", [curve(200, walks=61)] * 3)}
     results = Results(plan=Plan(), seeds=table)
-    write(run_rows(results), tmp_path / "runs.csv")
-    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    write(tmp_path / "runs.csv", run_rows(results))
+    write(tmp_path / "curves.csv", list(curve_rows(results)))
     path = tmp_path / name
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(GaitshiftError, match=re.escape(says)):
-        Told.read(Plan(), tmp_path)
+        EarlierRuns.read(Plan(), tmp_path)
 
 
 def test_a_figure_of_a_policy_that_is_no_number_is_named(tmp_path):
     results = Results(plan=Plan(), seeds=like_the_paper())
-    write(run_rows(results), tmp_path / "runs.csv")
-    write(list(curve_rows(results)), tmp_path / "curves.csv")
+    write(tmp_path / "runs.csv", run_rows(results))
+    write(tmp_path / "curves.csv", list(curve_rows(results)))
     row = {"setting": "paper", "gait": "pace", "seed": 1, "walks_from_iteration": 86}
-    write([row | {"survival": 1.0, "speed_mean": None}], tmp_path / "gaits.csv")
-    told = Told.read(Plan(), tmp_path).figures
-    assert told == {"paper-pace-1": {"survival": 1.0, "speed_mean": None}}
-    write([row | {"survival": "all", "speed_mean": None}], tmp_path / "gaits.csv")
+    write(tmp_path / "gaits.csv", [row | {"survival": 1.0, "speed_mean": None}])
+    figures = EarlierRuns.read(Plan(), tmp_path).figures
+    assert figures == {"paper-pace-1": {"survival": 1.0, "speed_mean": None}}
+    write(tmp_path / "gaits.csv", [row | {"survival": "all", "speed_mean": None}])
     with pytest.raises(GaitshiftError, match=r"gaits\.csv, paper-pace-1 is damaged: .*'all'"):
-        Told.read(Plan(), tmp_path)
+        EarlierRuns.read(Plan(), tmp_path)
 
 
 def test_a_report_of_another_recipe_is_not_added_to(tmp_path):
     plan = Plan()
     results = Results(plan=plan, seeds=like_the_paper())
-    write(run_rows(results), tmp_path / "runs.csv")
-    write(list(curve_rows(results)), tmp_path / "curves.csv")
-    assert len(Told.read(plan, tmp_path).courses) == 15
-    assert len(Told.read(replace(plan, seeds=2), tmp_path).courses) == 6, "as far as it is planned"
+    write(tmp_path / "runs.csv", run_rows(results))
+    write(tmp_path / "curves.csv", list(curve_rows(results)))
+    assert len(EarlierRuns.read(plan, tmp_path).curves) == 15
+    assert len(EarlierRuns.read(replace(plan, seeds=2), tmp_path).curves) == 6, (
+        "as far as it is planned"
+    )
     with pytest.raises(GaitshiftError, match="paper-trot-0 with another recipe"):
-        Told.read(Plan.tiny(), tmp_path)
-    assert not Told.read(plan, tmp_path / "nothing").courses
+        EarlierRuns.read(Plan.tiny(), tmp_path)
+    assert not EarlierRuns.read(plan, tmp_path / "nothing").curves
 
 
 # Figures ----------------------------------------------------------------------------------------
@@ -387,194 +374,3 @@ def test_a_curve_is_the_mean_and_its_band_the_spread(tmp_path):
 
 
 # Runs -------------------------------------------------------------------------------------------
-
-
-def tiny_jobs(*names):
-    return [job for job in Plan.tiny().jobs if job.setting.name in names]
-
-
-def test_a_run_of_other_numbers_is_not_taken_for_this_one(tmp_path):
-    (job,) = tiny_jobs("blind")
-    train(job, tmp_path)
-    assert is_over(job, tmp_path)
-    other = replace(job, recipe=replace(job.recipe, robots=7))
-    with pytest.raises(GaitshiftError, match="with another recipe; give another --runs"):
-        is_over(other, tmp_path)
-    with pytest.raises(GaitshiftError, match="with another seed"):
-        is_over(replace(job, seed=1), tmp_path)
-
-
-def spoil_update(monkeypatch, iteration, spoil):
-    """Lets `spoil` meet the learner before the update of an iteration, counted from 1."""
-    update, count = PPO.update, iter(range(1, 100))
-
-    def spoiled(self):
-        if next(count) == iteration:
-            spoil(self)
-        return update(self)
-
-    monkeypatch.setattr(PPO, "update", spoiled)
-
-
-def no_number(part):
-    """Makes one of the actor's parameters, or what was seen, not a number."""
-
-    def spoil(ppo):
-        with torch.no_grad():
-            if part == "returns":
-                ppo.storage.returns[0, 0] = torch.nan
-            else:
-                dict(ppo.actor.named_parameters())[part].flatten()[0] = torch.nan
-
-    return spoil
-
-
-@pytest.mark.parametrize("part", ["mlp.0.weight", "distribution.std_param", "returns"])
-def test_a_run_that_breaks_down_in_its_numbers_is_a_finding(part, tmp_path, monkeypatch):
-    (job,) = tiny_jobs("multiply")
-    spoil_update(monkeypatch, 2, no_number(part))
-    train(job, tmp_path / job.name)
-    assert is_over(job, tmp_path / job.name)
-    text = (tmp_path / job.name / FAILED).read_text()
-    assert text.startswith("training diverged: ")
-    assert text.count("\n") == 1
-    results = Results.read(Plan.tiny(), tmp_path)
-    assert results.seeds["multiply", "trot"].broken == (True,)
-    assert len(results.seeds["multiply", "trot"].courses[0]) == 1
-    assert results.seeds["multiply", "trot"].walking == 0
-
-
-def test_weights_that_are_no_numbers_are_told_before_anybody_acts_on_them(tmp_path):
-    (job,) = tiny_jobs("multiply")
-    run = Run.create(tmp_path / "run", job.machine, job.recipe, seed=0, command="test")
-    with torch.no_grad():
-        run.learner.ppo.actor.mlp[0].weight[3, 1] = torch.nan
-    with pytest.raises(DivergedError, match="training diverged: an action is not a number"):
-        run.iterate()
-    with torch.no_grad():
-        run.learner.ppo.actor.distribution.std_param[2] = torch.nan
-    with pytest.raises(
-        DivergedError, match=r"training diverged: distribution\.std_param of the actor"
-    ):
-        run.iterate()
-
-
-@pytest.mark.parametrize(
-    "error", [OSError(28, "No space left on device"), RuntimeError("not enough memory")]
-)
-def test_what_else_ends_a_run_is_raised_and_the_same_call_goes_on(error, tmp_path, monkeypatch):
-    (job,) = tiny_jobs("multiply")
-
-    def spoil(ppo):
-        raise error
-
-    with monkeypatch.context() as context:
-        spoil_update(context, 3, spoil)
-        with pytest.raises(type(error)):
-            train(job, tmp_path / job.name)
-    assert not (tmp_path / job.name / FAILED).exists()
-    assert not is_over(job, tmp_path / job.name)
-    train(job, tmp_path / job.name)
-    assert is_over(job, tmp_path / job.name)
-    assert len(course_of(tmp_path / job.name)) == job.recipe.iterations
-
-
-def test_nothing_is_done_twice(tmp_path):
-    (job,) = tiny_jobs("gains", "paper-gains")
-    train(job, tmp_path / job.name)
-    before = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}
-    train_all([job], tmp_path, 2)
-    assert {path: path.stat().st_mtime_ns for path in before} == before
-
-
-def living(group):
-    """Processes of a group that are not over."""
-    table = subprocess.run(["ps", "-eo", "pgid=,stat="], capture_output=True, text=True, check=True)
-    rows = [line.split() for line in table.stdout.splitlines()]
-    return [stat for pgid, stat in rows if int(pgid) == group and not stat.startswith("Z")]
-
-
-@pytest.mark.slow
-def test_quick_from_ctrl_c_to_the_report(tmp_path, capsys):
-    """Interrupted at its first run: one line, 130, no process left; then it goes on to the end."""
-    runs, out = tmp_path / "runs", tmp_path / "results"
-    arguments = ["reproduce", "--quick", "--runs", str(runs), "--out", str(out)]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "gaitshift", *arguments, "--jobs", "1"],
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    wait_until(lambda: any(runs.glob("*/policy.onnx")) or process.poll() is not None, pause=0.02)
-    assert process.poll() is None, process.stderr.read()
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process of the command
-    said = process.communicate(timeout=PATIENCE)[1]
-    assert process.returncode == 130
-    assert said.strip() == "gaitshift: interrupted"
-    wait_until(lambda: not living(process.pid))
-    assert not out.exists()
-    first = {path: path.stat().st_mtime_ns for path in runs.glob("*/policy.onnx")}
-    assert 1 <= len(first) < len(Plan.tiny().jobs)
-
-    main([*arguments, "--json"])
-    told = json.loads(capsys.readouterr().out)
-    assert {path: path.stat().st_mtime_ns for path in first} == first, "done once is done"
-    assert {path.name for path in out.iterdir()} == set(told["files"])
-    assert {"README.md", "reward.png", "ablations.png", "contacts-pace.png"} <= set(told["files"])
-    assert len(told["findings"]) == 10
-    assert [row["setting"] for row in told["ablations"]] == ["paper", *(s.name for s in ABLATIONS)]
-    assert all(f["measured"] in (out / "README.md").read_text() for f in told["findings"])
-    for job in Plan.tiny().jobs:
-        with (runs / job.name / "progress.csv").open(newline="") as file:
-            iterations = [int(row["iteration"]) for row in csv.DictReader(file)]
-        assert iterations == list(range(1, job.recipe.iterations + 1))
-
-    # Folders that are gone, and one run that the report does not tell of.
-    for job in Plan.tiny().jobs:
-        shutil.rmtree(runs / job.name)
-    before = {path.name: path.read_bytes() for path in out.iterdir()}
-    lines = (out / "runs.csv").read_text().splitlines(keepends=True)
-    (out / "runs.csv").write_text("".join(line for line in lines if "curriculum" not in line))
-    main([*arguments, "--add", "--json"])
-    assert json.loads(capsys.readouterr().out) == told
-    assert [path.name for path in runs.iterdir()] == ["curriculum-trot-0"]
-    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["--only", "canter"], "got 'canter'"),
-        (["--jobs", "0"], "jobs must be 1 to 1024, got 0"),
-        (["--seed", "-1"], "seed must be 0 or larger, got -1"),
-        (["--out", "file"], "must be a folder, got the file file"),
-        (["--out", "file/x/y"], "must be a folder, got the file file"),
-        (["--runs", "file/x"], "must be a folder, got the file file"),
-    ],
-)
-def test_a_fault_of_the_user_is_one_line(arguments, says, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    Path("file").touch()
-    with pytest.raises(SystemExit) as end:
-        main(["reproduce", *arguments])
-    assert end.value.code == 2
-    assert says in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_without_torch_one_line_says_what_is_missing():
-    program = """
-import sys
-class Missing:
-    def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] == "torch":
-            raise ModuleNotFoundError("No module named 'torch'", name="torch")
-sys.meta_path.insert(0, Missing())
-from gaitshift.cli import main
-main(["reproduce", "--quick"])
-"""
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert done.stderr.strip() == (
-        "gaitshift: training needs the package 'torch'; install gaitshift[train]"
-    )

@@ -11,9 +11,10 @@ from scipy import stats
 from gaitshift.cli import main
 from gaitshift.control import policy
 from gaitshift.lab.evaluation import DemoConfig, run_demo
-from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, ways
+from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, strategies
 from gaitshift.lab.studies.crossing_table import COLUMNS, mean_of, row_of
-from gaitshift.show.plots.crossings import crossings_figure
+from gaitshift.show.plots.studies import crossings_figure
+from synthetic import changed
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 BOTH = {"trot": TROT, "bound": BOUND}
@@ -24,22 +25,21 @@ MASS, GRAVITY = 30.4754, 9.81
 def log():
     """Three robots for 5 s, as if on rails: 1 m/s, all joints turning at 2 rad/s with 5 N m."""
     config = DemoConfig(gaits=("trot", "bound"), at=(4.8,), episodes=3, every=0.2)
-    real = run_demo(config, BOTH)[0]
-    qpos, qvel = np.zeros_like(real.qpos), np.zeros_like(real.qvel)
-    qpos[..., 0] = 7.0 + 0.01 * np.arange(len(real.time))[:, None]
-    qvel[..., 6:] = 2.0
-    return replace(
+    real = run_demo(config)[0]
+    place = np.zeros((len(real.time), 1, 3))
+    place[:, 0, 0] = 7.0 + 0.01 * np.arange(len(real.time))
+    return changed(
         real,
-        qpos=qpos,
-        qvel=qvel,
-        torque=np.full_like(real.torque, -5.0),
-        fallen=np.zeros_like(real.fallen),
-        gait=np.zeros_like(real.gait),
+        base_position_w=place,
+        joint_velocity=2.0,
+        joint_torque=-5.0,
+        fallen=False,
+        gait=0,
     )
 
 
 def test_robots_on_rails_come_as_far_and_cost_as_much_as_mechanics_says(log):
-    out = measure_crossings(log, 3.0)
+    out = measure_crossings(log, 3.0, MASS)
     assert out.arrived.all()
     assert not out.fell.any()
     np.testing.assert_allclose(out.distance, 3.0)
@@ -53,7 +53,7 @@ def test_what_comes_after_the_finish_or_a_fall_does_not_count(log):
     fallen[150:, 0] = True  # at 1.5 m
     fallen[350:, 1] = True  # behind the finish
     gait[100:, :2], gait[200:, 0], gait[320:, 1] = 1, 0, 0
-    out = measure_crossings(replace(log, fallen=fallen, gait=gait), 3.0)
+    out = measure_crossings(replace(log, fallen=fallen, gait=gait), 3.0, MASS)
     assert out.fell.tolist() == [True, False, False]
     assert out.arrived.tolist() == [False, True, True]
     np.testing.assert_allclose(out.distance, [1.5, 3.0, 3.0])
@@ -61,7 +61,7 @@ def test_what_comes_after_the_finish_or_a_fall_does_not_count(log):
 
 
 def test_a_robot_that_never_arrives_is_measured_over_all_of_its_time(log):
-    out = measure_crossings(log, 100.0)
+    out = measure_crossings(log, 100.0, MASS)
     assert not out.arrived.any()
     assert not out.fell.any()
     np.testing.assert_allclose(out.distance, 4.99)
@@ -72,7 +72,7 @@ def test_a_robot_that_falls_at_once_has_no_cost_of_transport(log):
     fallen = log.fallen.copy()
     fallen[50:, 2] = True
     assert np.isnan(
-        measure_crossings(replace(log, fallen=fallen), 3.0).cost_of_transport
+        measure_crossings(replace(log, fallen=fallen), 3.0, MASS).cost_of_transport
     ).tolist() == [
         False,
         False,
@@ -90,16 +90,16 @@ def test_intervals_of_means_are_scipys():
 
 
 def test_more_shifts_than_there_and_back_are_chatter(log):
-    out = measure_crossings(log, 3.0)
+    out = measure_crossings(log, 3.0, MASS)
     four = {f.name: np.resize(getattr(out, f.name), 4) for f in fields(out)}
-    way = ways("trot", "bound", ())[0]
+    way = strategies("trot", "bound", ())[0]
     row = row_of(way, 0.1, 0, Crossings(**four | {"shifts": np.array([2, 3, 0, 5])}))
     assert (row["chattered"], row["shifts"], row["runs"]) == (2, 2.5, 4)
 
 
 def test_only_the_oracle_shifts_where_the_noise_is_seen():
     """On level ground nobody does; over noise the oracle goes there and back once."""
-    alone, _, height, oracle = ways("trot", "bound", ("height_difference",))
+    alone, _, height, oracle = strategies("trot", "bound", ("height_difference",))
     for way in (alone, height, oracle):
         assert cross(BOTH, way, amplitude=0.0, runs=4, seed=1).shifts.tolist() == [0] * 4
     assert cross(BOTH, oracle, amplitude=0.1, runs=4, seed=1).shifts.tolist() == [2] * 4

@@ -2,7 +2,6 @@
 
 import csv
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,9 +12,10 @@ from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.studies import Pair, run_pair
 from gaitshift.lab.studies.transition_table import COLUMNS
 from gaitshift.lab.studies.transitions import measure_shifts, running_mean
-from gaitshift.lab.table import read_rows
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.show.plots.transitions import transition_map
+from gaitshift.show.plots.studies import transition_map
+from gaitshift.table import read_typed
+from synthetic import changed
 
 TROT, BOUND = policy.load("trot"), policy.load("bound")
 
@@ -24,13 +24,13 @@ TROT, BOUND = policy.load("trot"), policy.load("bound")
 def walk():
     """A log of two robots that trot for 8 s."""
     config = DemoConfig(gaits=("trot", "bound"), at=(7.9,), episodes=2, every=0.2)
-    return run_demo(config, {"trot": TROT, "bound": BOUND})[0]
+    return run_demo(config)[0]
 
 
 def shifted(log, at=200, **changes):
-    log = replace(
-        log, **{name: change(getattr(log, name).copy()) for name, change in changes.items()}
-    )
+    """Outcomes where functions of copies replace arrays: `contact`, or any of the log or truth."""
+    arrays = {"contact": log.sensed.contact, **vars(log.truth), **vars(log)}
+    log = changed(log, **{name: change(arrays[name].copy()) for name, change in changes.items()})
     return measure_shifts(log, np.full(2, at), TROT, BOUND)
 
 
@@ -78,20 +78,17 @@ def test_a_fall_within_five_seconds_is_a_failure_and_one_after_is_not(walk):
 def test_tilt_and_dip_are_those_of_the_motion(walk):
     roll = 0.4
 
-    def lies(qpos):
-        qpos[300, :, 3:7] = [np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0]
-        return qpos
+    def lies(quaternion):
+        quaternion[:] = [1.0, 0.0, 0.0, 0.0]
+        quaternion[300] = [np.cos(roll / 2), np.sin(roll / 2), 0.0, 0.0]
+        return quaternion
 
-    def slows(qvel):
-        qvel[..., :2] = [1.0, 0.0]
-        qvel[400:460, 0, 0] = 0.3
-        return qvel
+    def slows(velocity):
+        velocity[..., :2] = [1.0, 0.0]
+        velocity[400:460, 0, 0] = 0.3
+        return velocity
 
-    def straight(qpos):
-        qpos[..., 3:7] = [1.0, 0.0, 0.0, 0.0]
-        return lies(qpos)
-
-    outcomes = shifted(walk, qpos=straight, qvel=slows)
+    outcomes = shifted(walk, base_quaternion_w=lies, velocity_b=slows)
     assert outcomes.tilt == pytest.approx(roll, abs=1e-3)
     slower = min(TROT.info.forward_speed, BOUND.info.forward_speed)
     assert outcomes.dip == pytest.approx([slower - 0.3, slower - 1.0])
@@ -192,13 +189,13 @@ def test_the_map_shades_failures_and_counts_them(tmp_path):
     assert np.isnan(np.ma.filled(shades, np.nan)[0, 0])
 
 
-def test_read_rows_gives_what_was_written(tmp_path):
-    assert read_rows(tmp_path / "none.csv", COLUMNS, "shifts") == []
+def test_read_typed_gives_what_was_written(tmp_path):
+    assert read_typed(tmp_path / "none.csv", COLUMNS, "shifts") == []
     path = tmp_path / "transitions.csv"
     with path.open("w", newline="") as file:
         lines = csv.writer(file)
         lines.writerow(COLUMNS)
         lines.writerow(["a", "b", "flat", 0, 8, 0, 0.0, 0.3, 8, "", "", 0.4, 80.0, "0 to 0.1", 0.0])
-    (row,) = read_rows(path, COLUMNS, "shifts")
+    (row,) = read_typed(path, COLUMNS, "shifts")
     assert row["switches"] == 8
     assert row["settle_s"] == ""

@@ -68,7 +68,7 @@ def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
     assert all(row.value < 1.0 and row.limit is None for row in shares), "nobody walks"
     lateral = [row for row in rows if row.trial.startswith("lateral")]
     assert all(row.value is None and row.passed is False for row in lateral), "nobody walks"
-    assert log.contact.shape == (30, 3, 4)
+    assert log.sensed.contact.shape == (30, 3, 4)
     assert figures["verdict"]["gait"] == "none"
     assert done[-1][0] == done[-1][1]
     assert [now for now, _ in done] == sorted(now for now, _ in done)
@@ -112,19 +112,20 @@ def test_the_quick_trials_are_a_small_part_of_all():
 
 def test_the_lateral_error_is_taken_at_the_distance_and_who_never_arrives_is_beyond_all():
     """Robots at 1 m/s: drifting by 0.1 m a metre from y = 2; too slow; fallen before."""
-    log = log_of(np.zeros((300, 3, 4), dtype=bool))
-    x = np.arange(300) / 100
-    log.qpos[:, 0, 0], log.qpos[:, 0, 1] = x, 2.0 - 0.1 * x
-    log.qpos[:, 1, 0] = 0.3 * x
-    log.qpos[:, 2, 0] = x
+    x, place = np.arange(300) / 100, np.zeros((300, 3, 3))
+    place[:, 0, 0], place[:, 0, 1] = x, 2.0 - 0.1 * x
+    place[:, 1, 0] = 0.3 * x
+    place[:, 2, 0] = x
+    log = log_of(np.zeros((300, 3, 4), dtype=bool), base_position_w=place)
     log.fallen[50:, 2] = True
     assert lateral_errors(log, 2.0) == pytest.approx([0.2, np.inf, np.inf])
 
 
 def test_the_distance_is_taken_along_x_until_the_fall():
     """Robots at 1 m/s from x = 5 for 3 s: one goes on, one falls after 1 s, one at once."""
-    log = log_of(np.zeros((301, 3, 4), dtype=bool))
-    log.qpos[:, :, 0] = 5.0 + np.arange(301)[:, None] / 100
+    place = np.zeros((301, 1, 3))
+    place[:, 0, 0] = 5.0 + np.arange(301) / 100
+    log = log_of(np.zeros((301, 3, 4), dtype=bool), base_position_w=place)
     log.fallen[101:, 1] = True
     log.fallen[:, 2] = True
     assert distances(log) == pytest.approx([3.0, 1.0, 0.0], abs=1e-5)

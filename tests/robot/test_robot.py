@@ -209,6 +209,11 @@ def test_every_link_lies_where_it_is_published(link):
     np.testing.assert_array_equal(body.quat, (0, 0, 1, 0) if link == "imu_link" else (1, 0, 0, 0))
 
 
+def test_the_mass_is_that_of_all_links():
+    assert ANYMAL_B.mass == pytest.approx(sum(published(link)[0] for link in ALL_LINKS), abs=1e-9)
+    assert ANYMAL_B.mass == compiled().body_mass.sum()
+
+
 def test_the_model_has_no_other_links():
     bodies = mujoco.MjSpec.from_file(str(ANYMAL_B.model_file)).bodies
     assert {body.name for body in bodies} == {"world", *map(our_name, ALL_LINKS)}

@@ -6,6 +6,7 @@ import pytest
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.gait_analysis import measure
+from gaitshift.robot.description import ANYMAL_B
 from gaitshift.show.plots import gait_colours, hildebrand_diagram
 from synthetic import TABLE, contacts, log_of
 
@@ -14,7 +15,7 @@ def diagram(gait, path):
     touchdowns, duty = TABLE[gait]
     machine = gaits.load(gait)
     log = log_of(contacts(touchdowns, duty, frequency=1.6, robots=3), gaits=(gait,))
-    figures = measure(log, {gait: machine}, mass=30.0)
+    figures = measure(log, {gait: machine}, ANYMAL_B)
     return hildebrand_diagram(log, figures, machine, path), figures
 
 
@@ -51,6 +52,6 @@ def test_shipped_gaits_have_eight_colours():
 def test_no_robot_no_diagram(tmp_path):
     machine = gaits.load("trot")
     log = log_of(contacts(*TABLE["trot"], frequency=2.5))
-    figures = measure(log, {"trot": machine}, mass=30.0)
+    figures = measure(log, {"trot": machine}, ANYMAL_B)
     with pytest.raises(GaitshiftError, match=r"robot must be .*, got 9"):
         hildebrand_diagram(log, figures, machine, tmp_path / "gait.png", robot=9)

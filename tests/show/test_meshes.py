@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.show.geometry import Shape, collada, has_meshes, meshes, put_on
+from gaitshift.show.geometry import Shape, has_meshes, meshes, put_on
 
 needs_meshes = pytest.mark.skipif(
     not has_meshes(ANYMAL_B), reason="the extra [meshes] is not installed"
@@ -90,7 +90,7 @@ def test_they_are_converted_once(cache: Path, monkeypatch: pytest.MonkeyPatch):
     (kept,) = cache.iterdir()
     assert metadata.version("example-robot-data") in kept.name
 
-    def refuse(urdf: Path) -> list[collada.Part]:
+    def refuse(urdf: Path) -> list[meshes.Part]:
         raise AssertionError("converted again")
 
     with monkeypatch.context() as patched:

@@ -13,9 +13,10 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.plots import contact_diagram, demo_figure, gait_colours, training_curves
-from gaitshift.show.plots.palette import INK, LEG_COLOURS
-from gaitshift.show.plots.signals import forward_speed, smoothed
+from gaitshift.show.plots.signals import smoothed
+from gaitshift.show.plots.style import INK, LEG_COLOURS
 from gaitshift.sim.terrain import from_spec
+from synthetic import changed, log_of, turned
 
 STANCES = {
     "FL": [(0.0, 0.3), (0.5, 0.8), (1.0, 1.9)],
@@ -41,37 +42,31 @@ def course(steps: int = 200) -> Log:
         for begin, end in STANCES[name]:
             contact[round(100 * begin) : round(100 * end), 0, leg] = True
     ground = from_spec("step:0.1", seed=0, length=4.0, width=6.0)
-    qpos, qvel = np.zeros((steps, 2, 19)), np.zeros((steps, 2, 18))
-    qpos[:, 0, 0], qpos[:, 1, 0], qpos[:, 1, 1] = 1.0 + t[:, 0], 0.5, t[:, 0]
-    qpos[:, :, 2], qpos[:, 0, 3] = 0.46, 1.0
-    qpos[:, 1, 3] = qpos[:, 1, 6] = np.sqrt(0.5)
-    qvel[:, 0, 0] = qvel[:, 1, 1] = 1.0
+    base, yaw = np.full((steps, 2, 3), 0.46), np.array([0.0, np.pi / 2])
+    base[:, 0, :2] = np.column_stack([1.0 + t[:, 0], np.zeros(steps)])
+    base[:, 1, :2] = np.column_stack([np.full(steps, 0.5), t[:, 0]])
     feet = np.zeros((steps, 2, 4, 3))
-    feet[..., :2] = qpos[:, :, None, :2]
+    feet[..., :2] = base[:, :, None, :2]
     feet[..., 2] = ground.height_at(feet[..., :2]) + 0.02
+    below = np.zeros((steps, 1, 4, 3))
+    below[..., 2] = -0.46 + 0.01 * np.arange(4) + 0.02 * t[..., None]
     shifted = time - 1.0 >= SHIFT
-    return Log(
+    return log_of(
+        contact,
         time=time,
-        qpos=qpos,
-        qvel=qvel,
-        torque=np.zeros((steps, 2, 12)),
-        contact=contact,
+        base_position_w=base,
+        quaternion=turned(yaw),
+        velocity_b=[1.0, 0.2, 0.1],
         foot_position_w=feet,
-        clearance=np.full((steps, 2, 4), 0.02),
-        foot_height=-0.46 + 0.01 * np.arange(4) + 0.02 * t[..., None] * np.ones((1, 2, 1)),
-        k=np.tile(np.where(shifted, 5.0, 40 * (time - 1.0) / SHIFT)[:, None], (1, 2)),
-        threshold=np.tile(np.where(shifted, 15.0, 40.0)[:, None], (1, 2)),
+        foot_position_b=below,
+        clearance=0.02,
+        k=np.where(shifted, 5.0, 40 * (time - 1.0) / SHIFT)[:, None],
+        threshold=np.where(shifted, 15.0, 40.0)[:, None],
         gait=np.stack([shifted.astype(int), np.zeros(steps, dtype=int)], axis=1),
-        machine_state=np.zeros((steps, 2), dtype=int),
-        stance_shown=np.ones((steps, 2), dtype=bool),
+        stance_shown=True,
         fallen=np.stack([np.zeros(steps, dtype=bool), time - 1.0 >= FALL], axis=1),
-        command=np.tile([1.2, 0.0, 2.5], (steps, 2, 1)),
         gaits=("trot", "bound"),
-        robot="anymal_b",
-        terrain="step:0.1",
-        terrain_height=ground.height,
-        terrain_size=np.array(ground.size),
-        terrain_origin=np.array(ground.origin),
+        terrain=ground,
     )
 
 
@@ -124,10 +119,18 @@ def test_counter_and_threshold_are_the_logs(page):
 
 
 def test_foot_heights_are_the_logs_in_centimetres_from_the_first_touch_on(page):
-    drawn = lines(page[2])
+    """Feet rise by 2 cm a second below the base, each from a height of its own, while they stand.
+
+    In the air a foot keeps the height at which it stood last.
+    """
+    drawn, steps = lines(page[2]), np.arange(200) / 100
     for leg, name in enumerate(LEGS):
-        first = round(100 * STANCES[name][0][0])
-        assert np.allclose(drawn[name], 100 * LOG.foot_height[first:, 0, leg])
+        begin, last = STANCES[name][0][0], np.full(200, np.nan)
+        for down, up in STANCES[name]:
+            stood = np.clip(steps, down, up - 0.01)
+            last[steps >= down - 1e-9] = stood[steps >= down - 1e-9]
+        expected = -46.0 + leg + 2.0 * last[round(100 * begin) :]
+        assert np.allclose(drawn[name], expected)
 
 
 def test_speed_is_drawn_with_its_command(page):
@@ -136,15 +139,15 @@ def test_speed_is_drawn_with_its_command(page):
 
 
 def test_ground_is_the_terrain_below_the_base(page):
-    x = LOG.qpos[:, 0, 0]
+    x = LOG.truth.base_position_w[:, 0, 0]
     drawn = lines(page[5])
     assert np.allclose(drawn["ground"][x < 1.95], 0.0)
     assert np.allclose(drawn["ground"][x > 2.05], 0.1)
-    assert np.array_equal(drawn["base"], LOG.qpos[:, 0, 2])
+    assert np.array_equal(drawn["base"], LOG.truth.base_position_w[:, 0, 2])
 
 
 def test_ground_of_a_robot_elsewhere_is_that_below_its_feet(tmp_path):
-    elsewhere = replace(LOG, clearance=LOG.clearance - 0.3)
+    elsewhere = changed(LOG, clearance=LOG.truth.clearance - 0.3)
     figure = demo_figure(elsewhere, tmp_path / "demo.png", robot=1)
     assert np.allclose(lines(figure.axes[5])["ground"], 0.3)
 
@@ -226,7 +229,7 @@ def test_what_cannot_be_drawn_is_said_in_one_line(tmp_path, call, words):
 
 
 def first_entries(count):
-    return LOG.part(slice(0, count))
+    return LOG[:count]
 
 
 def test_two_entries_are_enough(tmp_path):
@@ -234,8 +237,12 @@ def test_two_entries_are_enough(tmp_path):
 
 
 @pytest.mark.parametrize("robot", [0, 1])
-def test_forward_speed_is_along_the_robots_own_nose(robot):
-    assert np.allclose(forward_speed(LOG, robot), 1.0)
+def test_forward_speed_is_along_the_robots_own_nose(robot, tmp_path):
+    """Both walk at 1 m/s the way they look, the second along +y, and drift to their left."""
+    speed = lines(demo_figure(LOG, tmp_path / "demo.png", robot=robot).axes[4])["each step"]
+    way = LOG.truth.base_position_w[:, robot, robot]
+    assert np.allclose(speed, 1.0)
+    assert np.allclose(np.diff(way), 0.01)
 
 
 def test_smoothing_keeps_straight_lines_and_stills_trembling():

@@ -12,7 +12,6 @@ import pytest
 
 import browsing
 from gaitshift.cli import main
-from gaitshift.control import policy
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.show.geometry import Shape
@@ -28,12 +27,12 @@ TRACK = "flat@4,perlin:0.12@4,flat@3"
 def log():
     """Two robots that shift to bound on noise."""
     config = DemoConfig(track=TRACK, episodes=2, beta=60.0)
-    return run_demo(config, {gait: policy.load(gait) for gait in config.used})[0]
+    return run_demo(config)[0]
 
 
 @pytest.fixture(scope="module")
 def data(log):
-    return run_data(log, 1)
+    return run_data(log, 1, ANYMAL_B)
 
 
 @pytest.fixture(scope="module")
@@ -54,15 +53,16 @@ def test_the_page_is_fed_with_the_logs_own_robot(log, data):
     np.testing.assert_allclose(unpacked(data["time"]), log.time, rtol=1e-6)
     bits = unpacked(data["contact"])
     feet = (bits[:, None] >> np.arange(4)) & 1
-    np.testing.assert_array_equal(feet, log.contact[:, 1])
+    np.testing.assert_array_equal(feet, log.sensed.contact[:, 1])
     base = [body["name"] for body in data["bodies"]].index("base")
     position = unpacked(data["position"]).reshape(frames, -1, 3)
     rotation = unpacked(data["rotation"]).reshape(frames, -1, 4)
-    np.testing.assert_allclose(position[:, base], log.qpos[::EVERY, 1, :3], atol=1e-5)
-    quaternion = log.qpos[::EVERY, 1, 3:7]
+    np.testing.assert_allclose(position[:, base], log.truth.base_position_w[::EVERY, 1], atol=1e-5)
+    quaternion = log.truth.base_quaternion_w[::EVERY, 1]
     aligned = np.abs((rotation[:, base] * quaternion).sum(axis=1))
     np.testing.assert_allclose(aligned, 1.0, atol=1e-5)
-    centre = unpacked(data["feet"]).reshape(frames, 4, 3) - log.foot_position_w[::EVERY, 1]
+    feet = log.truth.foot_position_w[::EVERY, 1]
+    centre = unpacked(data["feet"]).reshape(frames, 4, 3) - feet
     np.testing.assert_allclose(
         centre, np.broadcast_to([0, 0, ANYMAL_B.foot_radius], centre.shape), atol=1e-5
     )
@@ -78,13 +78,13 @@ def test_bodies_arrive_as_they_are(data):
 
 def test_the_ground_on_the_page_is_the_one_that_was_walked_on(log):
     ground = from_spec(f"{TRACK},flat@8", seed=0, length=1.0, width=8.0)
-    sent = run_data(log, 0)["ground"]
+    sent = run_data(log, 0, ANYMAL_B)["ground"]
     x = sent["x"][0] + sent["x"][1] * np.arange(sent["columns"])
     y = sent["y"][0] + sent["y"][1] * np.arange(sent["rows"])
     height = unpacked(sent["height"]).reshape(len(y), len(x))
     expected = ground.height_at(np.stack(np.meshgrid(x, y), axis=-1))
     np.testing.assert_allclose(height, expected, atol=1e-5)
-    walked = log.qpos[:, 0, 0]
+    walked = log.truth.base_position_w[:, 0, 0]
     assert x[0] <= walked.min()
     assert walked.max() <= x[-1]
 
@@ -96,16 +96,18 @@ def test_rows_hold_the_signals_and_no_height_of_a_foot_that_has_not_touched(log,
     k, beta = (unpacked(series["values"]) for series in counter["series"])
     np.testing.assert_allclose(k, log.k[:, 1], rtol=1e-6)
     np.testing.assert_allclose(beta, log.threshold[:, 1], rtol=1e-6)
-    (heights,) = (row for title, row in rows.items() if title.startswith("height of each foot"))
+    (heights,) = (
+        row for title, row in rows.items() if title.startswith("height of the last touch")
+    )
     for leg, series in enumerate(heights["series"]):
-        first = log.contact[:, 1, leg].argmax()
+        first = log.sensed.contact[:, 1, leg].argmax()
         values = unpacked(series["values"])
         assert np.isnan(values[:first]).all()
-        np.testing.assert_allclose(values[first:], log.foot_height[first:, 1, leg], rtol=1e-6)
+        np.testing.assert_allclose(values[first:], log.touch_height[first:, 1, leg], rtol=1e-6)
 
 
 def test_a_minute_of_walking_stays_below_15_megabytes(log, page, data):
-    fixed = len((ROOT / "src/gaitshift/report/player.js").read_bytes())
+    fixed = len((ROOT / "src/gaitshift/show/report/player.js").read_bytes())
     fixed += len(json.dumps(data["bodies"]))
     moving = page.stat().st_size - fixed
     assert fixed + moving * 60.0 / float(log.time[-1]) < 15e6 - 6e6, "beside the largest film"
@@ -138,7 +140,7 @@ def test_scripts_were_made_from_their_sources(bundle, own):
     total = hashlib.sha256()
     for name in (*own, "theme.js", "unpack.js", "package.json"):
         total.update((ROOT / "web" / name).read_bytes())
-    head = (ROOT / "src/gaitshift/report" / bundle).read_text()[:200]
+    head = (ROOT / "src/gaitshift/show/report" / bundle).read_text()[:200]
     assert total.hexdigest() in head, "run: make player"
 
 
@@ -183,13 +185,13 @@ def test_the_page_opens_without_a_network_and_its_slider_moves_the_robot(log, pa
         return opened.evaluate("gaitshift.view.position()")
 
     opened.evaluate("gaitshift.seek(0)")
-    np.testing.assert_allclose(position(), log.qpos[0, 1, :3], atol=1e-4)
+    np.testing.assert_allclose(position(), log.truth.base_position_w[0, 1], atol=1e-4)
     told = opened.locator("#charts .note").inner_text()
     assert told.startswith("0.01 s")
     assert "NaN" not in told, "of feet that have not touched yet there is nothing to tell"
     slider = opened.locator("#time")
     slider.fill("4")
-    np.testing.assert_allclose(position()[0], log.qpos[400, 1, 0], atol=0.03)
+    np.testing.assert_allclose(position()[0], log.truth.base_position_w[400, 1, 0], atol=0.03)
     assert opened.locator("#clock").inner_text() == "4.00 s"
     opened.locator("#play").click()
     opened.wait_for_function("gaitshift.state.time > 4.3")

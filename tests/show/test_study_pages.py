@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_identify import march, table
 from test_report import unpacked
 
 import browsing
 from gaitshift.cli import main
 from gaitshift.show.report.figures import Axis
+from marches import march, table
 
 SHIFTS = Path(__file__).parents[2] / "docs" / "results" / "shifting" / "transitions"
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import Command
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.state import Privileged, Proprioception
 from gaitshift.sim.reward import (
     ADDITIONS,
     BONUS_MODES,
@@ -47,22 +47,28 @@ HALF = np.sqrt(0.5)
 
 
 def still(n):
-    """Fields of a motion of n robots that stand upright in STANCE, all feet down."""
-    return {
-        "joint_position": np.tile(STANCE, (n, 1)),
-        "joint_velocity": np.zeros((n, 12)),
-        "joint_torque": np.zeros((n, 12)),
-        "base_position_w": np.zeros((n, 3)),
-        "base_quaternion_w": np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
-        "base_linear_velocity_w": np.zeros((n, 3)),
-        "base_angular_velocity_b": np.zeros((n, 3)),
-        "foot_position_w": np.zeros((n, 4, 3)),
-        "foot_velocity_w": np.zeros((n, 4, 3)),
-        "foot_force": np.zeros((n, 4)),
-        "contact": np.ones((n, 4), dtype=bool),
-        "clearance": np.zeros((n, 4)),
-        "body_contact": np.zeros(n, dtype=bool),
-    }
+    """Robots that stand upright in STANCE, all feet down: what they sense, and the truth."""
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
+    sensed = Proprioception(
+        contact=np.ones((n, 4), dtype=bool),
+        foot_position_b=np.zeros((n, 4, 3)),
+        orientation=upright,
+        joint_position=np.tile(STANCE, (n, 1)),
+        joint_velocity=np.zeros((n, 12)),
+        joint_torque=np.zeros((n, 12)),
+        angular_velocity_b=np.zeros((n, 3)),
+    )
+    truth = Privileged(
+        base_position_w=np.zeros((n, 3)),
+        base_quaternion_w=upright,
+        velocity_b=np.zeros((n, 3)),
+        foot_position_w=np.zeros((n, 4, 3)),
+        foot_velocity_w=np.zeros((n, 4, 3)),
+        foot_force=np.zeros((n, 4)),
+        clearance=np.zeros((n, 4)),
+        body_contact=np.zeros(n, dtype=bool),
+    )
+    return sensed, truth
 
 
 def only(index, value):
@@ -73,30 +79,35 @@ def only(index, value):
 
 def three_robots():
     """Robot 0 level along world x, robot 1 turned left by 90°, robot 2 nose down by 90°."""
-    fields = still(3)
+    sensed, truth = still(3)
     swapped = STANCE.copy()
     swapped[[0, 1]] = swapped[[1, 0]]
-    fields["joint_position"] = np.stack([STANCE + 0.01 * RAMP, swapped, STANCE])
-    fields["joint_velocity"] = np.stack([0.5 * RAMP, only(7, -2.0), np.zeros(12)])
-    fields["joint_torque"] = np.stack([RAMP, only(3, -20.0), np.zeros(12)])
-    fields["base_quaternion_w"] = np.array(
-        [[1.0, 0.0, 0.0, 0.0], [HALF, 0.0, 0.0, HALF], [HALF, 0.0, HALF, 0.0]]
+    heading = np.array([[1.0, 0.0, 0.0, 0.0], [HALF, 0.0, 0.0, HALF], [HALF, 0.0, HALF, 0.0]])
+    sensed = replace(
+        sensed,
+        orientation=heading,
+        joint_position=np.stack([STANCE + 0.01 * RAMP, swapped, STANCE]),
+        joint_velocity=np.stack([0.5 * RAMP, only(7, -2.0), np.zeros(12)]),
+        joint_torque=np.stack([RAMP, only(3, -20.0), np.zeros(12)]),
+        angular_velocity_b=np.array([[0.5, -1, 0.4], [0.2, 0.3, 0], [0.3, 0.1, -0.2]]),
+        contact=np.array([[True, False, True, False], [False] * 4, [True] * 4]),
     )
-    fields["base_linear_velocity_w"] = np.array(
-        [[0.7, 0.3, -0.2], [-0.3, 1.2, 0.1], [0.4, 0.2, -1]]
-    )
-    fields["base_angular_velocity_b"] = np.array([[0.5, -1, 0.4], [0.2, 0.3, 0], [0.3, 0.1, -0.2]])
-    fields["contact"] = np.array([[True, False, True, False], [False] * 4, [True] * 4])
-    fields["foot_velocity_w"] = np.array(
-        [
-            [[0.1, -0.2, 9], [5, 5, 5], [0.3, 0.4, 7], [6, 6, 6]],
-            [[1, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12]],
-            [[0, 0, 3], [0.6, -0.8, 0], [0, 0, 2], [0, 0.2, 0]],
-        ],
-        dtype=float,
+    truth = replace(
+        truth,
+        base_quaternion_w=heading,
+        velocity_b=np.array([[0.7, 0.3, -0.2], [1.2, 0.3, 0.1], [1.0, 0.2, 0.4]]),
+        foot_velocity_w=np.array(
+            [
+                [[0.1, -0.2, 9], [5, 5, 5], [0.3, 0.4, 7], [6, 6, 6]],
+                [[1, 2, 3], [4, 5, 6], [7, 8, 9], [10, 11, 12]],
+                [[0, 0, 3], [0.6, -0.8, 0], [0, 0, 2], [0, 0.2, 0]],
+            ],
+            dtype=float,
+        ),
     )
     return {
-        "motion": Motion(**fields),
+        "sensed": sensed,
+        "truth": truth,
         "command": Command(
             forward_speed=np.array([1.2, 0.2, 1.2]),
             yaw_rate=np.array([0.1, -0.2, 0.0]),
@@ -110,8 +121,7 @@ def three_robots():
 
 
 HAND_TABLE = {
-    # Body velocities: robot 0 (0.7, 0.3, -0.2); robot 1, x to world y, (1.2, 0.3, 0.1); robot 2,
-    # x to world -z and z to world x, (1, 0.2, 0.4).
+    # Body velocities: robot 0 (0.7, 0.3, -0.2); robot 1 (1.2, 0.3, 0.1); robot 2 (1, 0.2, 0.4).
     # 10 exp(-(1.2 - 0.7)²) = 10 exp(-0.25); 10 exp(-(0.2 - 1.2)²) = 10 exp(-1); 10 exp(-0.04)
     "forward_velocity": (7.788007830714049, 3.678794411714423, 9.607894391523232),
     # -10 (0.09 + 0.04); -10 (0.09 + 0.01); -10 (0.04 + 0.16)
@@ -172,12 +182,11 @@ def test_a_weight_of_zero_silences_its_term():
 
 
 def test_perfect_motion_earns_every_reward_whole_and_no_penalty():
-    fields = still(1)
-    fields["base_linear_velocity_w"] = np.array([[0.9, 0.0, 0.0]])
-    fields["base_angular_velocity_b"] = np.array([[0.0, 0.0, 0.3]])
+    sensed, truth = still(1)
     terms = walk_reward(
         CONFIG,
-        Motion(**fields),
+        replace(sensed, angular_velocity_b=np.array([[0.0, 0.0, 0.3]])),
+        replace(truth, velocity_b=np.array([[0.9, 0.0, 0.0]])),
         Command(
             forward_speed=np.array([0.9]),
             yaw_rate=np.array([0.3]),
@@ -196,23 +205,22 @@ def test_perfect_motion_earns_every_reward_whole_and_no_penalty():
 @settings(max_examples=30, deadline=None)
 @given(angle=st.floats(-3.0, 3.0))
 def test_the_reward_does_not_know_which_way_is_north(angle):
-    situation = three_robots()
-    motion = situation["motion"]
+    robots = three_robots()
+    sensed, truth = robots["sensed"], robots["truth"]
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    w, x, y, z = motion.base_quaternion_w.T
+    w, x, y, z = truth.base_quaternion_w.T
     a, b = np.cos(angle / 2), np.sin(angle / 2)
-    turned = replace(
-        motion,
-        # The product of (a, 0, 0, b) and (w, x, y, z).
-        base_quaternion_w=np.stack(
-            [a * w - b * z, a * x - b * y, a * y + b * x, a * z + b * w], axis=1
+    # The product of (a, 0, 0, b) and (w, x, y, z).
+    heading = np.stack([a * w - b * z, a * x - b * y, a * y + b * x, a * z + b * w], axis=1)
+    turned = {
+        "sensed": replace(sensed, orientation=heading),
+        "truth": replace(
+            truth, base_quaternion_w=heading, foot_velocity_w=truth.foot_velocity_w @ turn.T
         ),
-        base_linear_velocity_w=motion.base_linear_velocity_w @ turn.T,
-        foot_velocity_w=motion.foot_velocity_w @ turn.T,
-    )
-    before = walk_reward(CONFIG, **situation)
-    after = walk_reward(CONFIG, **{**situation, "motion": turned})
+    }
+    before = walk_reward(CONFIG, **robots)
+    after = walk_reward(CONFIG, **{**robots, **turned})
     for name, term in before.items():
         np.testing.assert_allclose(after[name], term, atol=1e-9, err_msg=name)
 

@@ -5,39 +5,39 @@ import os
 import select
 import sys
 from contextlib import redirect_stderr
-from typing import Annotated
+from importlib import import_module
+from typing import Annotated, Any, Protocol, Union, cast, runtime_checkable
 
 import tyro
 
-from gaitshift.cli.bench import Bench
-from gaitshift.cli.demo import Demo
-from gaitshift.cli.evaluate import Evaluate
-from gaitshift.cli.gaits import Gaits
-from gaitshift.cli.identify import Identify
 from gaitshift.cli.output import say
-from gaitshift.cli.record import Record
-from gaitshift.cli.report import Report
-from gaitshift.cli.reproduce import Reproduce
-from gaitshift.cli.study import Study
-from gaitshift.cli.train import Train
-from gaitshift.cli.transitions import Transitions
-from gaitshift.cli.view import View
 from gaitshift.errors import GaitshiftError
 
-Command = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Gaits, tyro.conf.subcommand("gaits")]
-    | Annotated[Train, tyro.conf.subcommand("train")]
-    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
-    | Annotated[Record, tyro.conf.subcommand("record")]
-    | Annotated[Identify, tyro.conf.subcommand("identify")]
-    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
-    | Annotated[Study, tyro.conf.subcommand("study")]
-    | Annotated[Transitions, tyro.conf.subcommand("transitions")]
-    | Annotated[Report, tyro.conf.subcommand("report")]
-    | Annotated[View, tyro.conf.subcommand("view")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
+COMMANDS = (
+    "demo",
+    "gaits",
+    "train",
+    "evaluate",
+    "record",
+    "identify",
+    "reproduce",
+    "study",
+    "transitions",
+    "report",
+    "view",
+    "bench",
 )
+"""The subcommands in the order of `--help`. A new one is a line here and a file beside this one of
+its name, with a dataclass of its name: `time-to-gait` is `TimeToGait` in `time_to_gait.py`."""
+
+
+@runtime_checkable
+class Command(Protocol):
+    """A subcommand: a dataclass whose fields are its options."""
+
+    def run(self) -> None:
+        """Does it; `GaitshiftError` for bad input."""
+
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
@@ -81,7 +81,7 @@ def _parse(arguments: list[str] | None) -> Command:
     try:
         with redirect_stderr(said):
             return tyro.cli(
-                Command,  # pyright: ignore[reportArgumentType]  (a union of annotated types)
+                cast(Any, Union)[tuple(_subcommand(name) for name in COMMANDS)],
                 prog="gaitshift",
                 description=(
                     "Train quadruped gaits described by reward machines, and let the robot shift "
@@ -94,6 +94,12 @@ def _parse(arguments: list[str] | None) -> Command:
         if end.code:
             raise GaitshiftError(_first_part(said.getvalue())) from None
         raise
+
+
+def _subcommand(name: str) -> Any:
+    module = import_module(f"gaitshift.cli.{name.replace('-', '_')}")
+    made = getattr(module, name.title().replace("-", ""))
+    return Annotated[made, tyro.conf.subcommand(name)]
 
 
 def _first_part(box: str) -> str:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from gaitshift.cli.growing import kept_rows
-from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift import table
+from gaitshift.cli.output import check_table_folder, emit_json, emit_table, progress, say
 from gaitshift.control import policy
 from gaitshift.data import located
 from gaitshift.errors import GaitshiftError
@@ -19,8 +19,15 @@ from gaitshift.lab.benchmark.outcome import (
     row_of,
     summary,
 )
-from gaitshift.lab.benchmark.speed import SpeedConfig, environment_speed, training_speed
-from gaitshift.lab.table import write_rows
+from gaitshift.lab.benchmark.speed import (
+    ALPHAS,
+    BETAS,
+    EPISODES,
+    SpeedConfig,
+    environment_speed,
+    replay_speed,
+    training_speed,
+)
 
 if TYPE_CHECKING:
     from gaitshift.lab.benchmark.time_to_gait import TimeToGait
@@ -142,12 +149,11 @@ class Bench:
 
     def _measure_replay(self) -> None:
         try:
-            from gaitshift.lab.benchmark.replay import ALPHAS, BETAS, EPISODES, replay_speed
+            seconds = replay_speed(self.speed.seed)
         except ImportError as error:
             raise GaitshiftError(
                 f"the replay needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        seconds = replay_speed(self.speed.seed)
         if self.json:
             emit_json(seconds)
             return
@@ -163,9 +169,12 @@ class Bench:
         config, out = options.config(), options.out
         known: list[Outcome] = []
         if out is not None:
-            kept = kept_rows(out / TABLE, COLUMNS, "trainings", overwrite=options.overwrite)
-            with located(str(out / TABLE)):
-                known = [outcome_of(row) for row in kept]
+            path = out / TABLE
+            check_table_folder(path, overwrite=options.overwrite)
+            earlier = [] if options.overwrite else table.read_typed(path, COLUMNS, "trainings")
+            with located(str(path)):
+                known = [outcome_of(row) for row in earlier]
+            out.mkdir(parents=True, exist_ok=True)
         outcomes: list[Outcome] = []
         with progress("training") as report:
             for outcome in time_to_gait(config, known):
@@ -174,7 +183,7 @@ class Bench:
                 say(f"{outcome.gait}, seed {outcome.seed}, {outcome.learner}: {_text(outcome)}")
                 if out is not None:
                     told = [*outcomes, *(one for one in known if not _told(one, outcomes))]
-                    write_rows(out / TABLE, COLUMNS, [row_of(one) for one in told])
+                    table.write(out / TABLE, [row_of(one) for one in told], COLUMNS)
                     _draw([one for one in told if is_of(config, one)], out)
         found = summary(outcomes)
         if self.json:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import tyro
 
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
-from gaitshift.control import policy
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.log import Log
@@ -49,7 +49,7 @@ _numbers = tyro.constructors.PrimitiveConstructorSpec[tuple[float, ...]](
 
 
 @dataclass(frozen=True, kw_only=True)
-class Demo(DemoConfig):
+class Demo(RobotOptions, DemoConfig):
     """Simulate a robot that crosses flat and rough ground and shifts its gait by itself."""
 
     gaits: Annotated[tuple[str, ...], names_option] = ()
@@ -69,12 +69,12 @@ class Demo(DemoConfig):
 
     def run(self) -> None:
         """Runs, draws, and says where to look."""
-        learned = self.controller == "policy"
-        policies = {gait: policy.load(gait) for gait in self.used} if learned else {}
+        _ = self.used  # what cannot be had is refused before any work
+        make = self.maker(self.controller)
         files = (PAGE, VIDEO, PICTURE, LOG, SUMMARY)
         check_folder(self.out, overwrite=self.overwrite, ours=files)
         with progress("walking") as report:
-            log, summaries = run_demo(self, policies, report)
+            log, summaries = run_demo(self, report, make=make)
         summary = self._summary(summaries)
         self.out.mkdir(parents=True, exist_ok=True)
         log.save(self.out / LOG)
@@ -118,14 +118,20 @@ class Demo(DemoConfig):
 
         video, command = self.out / VIDEO, shlex.join(["gaitshift", *sys.argv[1:]])
         facts = {"command": command, "seed": str(self.seed)}
-        write_report(log, self.out / PAGE, video=video if self.video else None, facts=facts)
+        write_report(
+            log,
+            self.out / PAGE,
+            description=self.read_robot(),
+            video=video if self.video else None,
+            facts=facts,
+        )
 
     def _render(self, log: Log) -> bool:
         from gaitshift.show.video import VideoUnavailable, render
 
         try:
             with progress("filming") as report:
-                render(log, self.out / VIDEO, report=report)
+                render(log, self.out / VIDEO, description=self.read_robot(), report=report)
         except VideoUnavailable as error:
             say(f"no video: {error}")
             return False

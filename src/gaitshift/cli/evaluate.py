@@ -9,10 +9,11 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
+from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy as policies
-from gaitshift.control.cpg import CpgController
+from gaitshift.control.controllers import controller_maker
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait import RewardMachine, gaits
+from gaitshift.gait import RewardMachine
 from gaitshift.lab.evaluation import (
     SIZES,
     EvaluationConfig,
@@ -24,7 +25,7 @@ from gaitshift.lab.evaluation import (
 )
 from gaitshift.lab.evaluation.trials import Row
 from gaitshift.lab.log import Log
-from gaitshift.robot.robot_file import use_robot_file
+from gaitshift.sim.terrain import spec_help
 
 Judged = tuple[dict[str, Any], Log]
 """Figures, and the log that they are of."""
@@ -46,19 +47,20 @@ UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(EvaluationConfig):
+class Evaluate(RobotOption, EvaluationConfig):
     """Evaluate a policy on many robots, without exploration noise.
 
     Figures exclude the first 2 s and robots after their fall.
     """
 
+    terrain: Annotated[str, tyro.conf.arg(help=f"Spec of the ground:\n{spec_help()}\n")] = (
+        EvaluationConfig.terrain
+    )
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
-    controller: Literal["policy", "cpg"] = "policy"
-    """Controller: the policy, or coupled oscillators without learning, as a baseline (trot, pace,
-    bound, walk)."""
-    robot_file: Path | None = None
-    """Robot file that was given to `train`, if the robot is not ANYmal B."""
+    controller: str = "policy"
+    """What walks, by name: `policy`; or, in the gait of this name, `cpg`, coupled oscillators that
+    learned nothing: a baseline (trot, pace, bound, walk)."""
     trials: Literal["all", "short", "quick"] | None = None
     """Run the standard trials and compare each figure with its limit: all (1000 pushed episodes,
     then 256 of 20 s on each terrain), short (a quarter of each), or quick (for a first check)."""
@@ -77,15 +79,15 @@ class Evaluate(EvaluationConfig):
     def run(self) -> None:
         """Evaluates, prints and draws."""
         self._check_files()
-        if self.controller == "cpg":
-            walker = CpgController([self.policy], self.episodes, start=self.policy)
+        if self.controller != "policy":
+            make, robot = controller_maker(self.controller), self.read_robot()
+            walker = make([self.policy], self.episodes, robot=robot)
             self._make_folder()
-            told = {"controller": "cpg", "gait": self.policy}
+            told = {"controller": self.controller, "gait": walker.repertoire.gaits[0]}
             figures, log = self._evaluate(partial(evaluate_controller, walker), told)
-            self._write(figures, log, gaits.load(self.policy))
+            self._write(figures, log, walker.repertoire.machines[0])
             return
-        use_robot_file(self.robot_file)
-        loaded = policies.load(self.policy)
+        loaded = policies.load(self.policy, self.read_robot())
         self._make_folder()
         if self.commands:
             self._command(loaded)
@@ -171,10 +173,6 @@ class Evaluate(EvaluationConfig):
             from gaitshift.show.plots.style import check_target
 
             check_target(self.plot)
-        if self.controller == "cpg" and self.robot_file is not None:
-            raise GaitshiftError(
-                "--robot-file must not be given with --controller cpg, which supports ANYmal B only"
-            )
         if self.trials is None and not self.commands:
             return
         mode = "--commands" if self.commands else "--trials"

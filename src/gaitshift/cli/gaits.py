@@ -9,7 +9,7 @@ import tyro
 from gaitshift.cli.output import check_folder, emit_json, say
 from gaitshift.control import policy
 from gaitshift.gait import RewardMachine, draw, gaits, mermaid
-from gaitshift.shift import GaitGraph
+from gaitshift.shift import load_graph
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class Gaits:
     def run(self) -> None:
         """Prints, and draws."""
         if self.graph:
-            graph = GaitGraph.load(self.graph)
+            graph = load_graph(self.graph)
             drawn = graph.mermaid()
             emit_json({"gaits": graph.gaits, "mermaid": drawn}) if self.json else print(drawn)
             return

@@ -17,6 +17,8 @@ from gaitshift.errors import GaitshiftError
 Report = Callable[[int, int], None]
 """Takes the work done and the work in all."""
 
+README = "README.md"
+"""Page in the folder of results."""
 
 _WHOLE = 1000
 """Columns that hold any table."""
@@ -75,3 +77,17 @@ def check_folder(
             f"{folder} exists and is not empty; give another --out, or --overwrite to replace "
             f"{', '.join(ours)} there"
         )
+
+
+def check_table_folder(path: Path, *, overwrite: bool) -> None:
+    """As `check_folder`, of the folder of a table; what lies beside a table stays."""
+    if not path.is_file():
+        check_folder(path.parent, overwrite=overwrite, ours=(path.name, README))
+
+
+def check_numbers(what: str, count: int, seed: int, *, least: int = 1) -> None:
+    """`GaitshiftError` unless there are so many, and the seed is one."""
+    if not least <= count <= 1_000_000:
+        raise GaitshiftError(f"{what} must be {least} to 1000000, got {count}")
+    if seed < 0:
+        raise GaitshiftError(f"seed must be 0 or larger, got {seed}")

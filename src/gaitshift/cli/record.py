@@ -2,23 +2,28 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import tyro
 
 from gaitshift.cli.output import emit_json, emit_table, progress, say
+from gaitshift.cli.robot_options import RobotOption
+from gaitshift.control import Controller
 from gaitshift.control import policy as policies
-from gaitshift.control.policy import Policy
+from gaitshift.control.controllers import controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select
 from gaitshift.lab.log import Log
+from gaitshift.lab.resume import Part, Report, run_missing
+from gaitshift.table import Row
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class Record(RobotOption):
     """Record gaits on the standard courses: flat, slopes, steps, stairs, pebbles, noise.
 
     Writes OUT/GAIT-COURSE-SEED.npz, one log of about 30 MB for each gait and course. Logs that
@@ -26,7 +31,10 @@ class Record:
     """
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional]
-    """Gaits of shipped policies, or policy files (.onnx)."""
+    """Shipped policies by the names of their gaits, or policy files ending in .onnx; with another
+    controller, names of its gaits."""
+    controller: str = "policy"
+    """What walks, by name: `policy`; `cpg`, coupled oscillators that learned nothing."""
     out: Path
     """Folder of the logs."""
     courses: tuple[str, ...] = ()
@@ -50,38 +58,32 @@ class Record:
                 "got none"
             )
         _ = EvaluationConfig(episodes=self.robots, seconds=self.seconds, seed=self.seed)
-        loaded = [policies.load(name) for name in self.policies]
+        gaits = [self._controller(name, 1).repertoire.gaits[0] for name in self.policies]
         chosen = select(self.courses)
         if self.out.exists() and not self.out.is_dir():
             raise GaitshiftError(f"--out must be a folder, got the file {self.out}")
-        gaits = [policy.gait for policy in loaded]
         twice = [gait for gait in gaits if gaits.count(gait) > 1]
         if twice:
             raise GaitshiftError(
                 f"policies must be of different gaits, got two of '{twice[0]}'; record them one by "
                 "one with different --out"
             )
-        kept = self._kept([(policy, course) for policy in loaded for course in chosen])
+        asked = [
+            (name, gait, course)
+            for name, gait in zip(self.policies, gaits, strict=True)
+            for course in chosen
+        ]
+        found = self._found([(gait, course) for _, gait, course in asked])
         self.out.mkdir(parents=True, exist_ok=True)
-        rows: list[dict[str, Any]] = []
-        for policy in loaded:
-            for course in chosen:
-                path = self._path(policy, course)
-                if path in kept:
-                    say(f"{path} exists, not recorded again")
-                    rows.append(kept[path])
-                    continue
-                with progress(f"{policy.gait}, {course.name}") as report:
-                    log = run_course(
-                        policy,
-                        course,
-                        robots=self.robots,
-                        seconds=self.seconds,
-                        seed=self.seed,
-                        report=report,
-                    )
-                log.save(path)
-                rows.append(_row(path, log))
+        parts = [
+            Part(
+                name=str(path := self._path(gait, course)),
+                find=partial(found.get, path),
+                work=partial(self._record, name, gait, course),
+            )
+            for name, gait, course in asked
+        ]
+        rows = run_missing(parts, progress=progress, say=say)
         if self.json:
             emit_json({"logs": rows})
         else:
@@ -91,19 +93,30 @@ class Record:
             ]
             emit_table(f"logs in {self.out}", table)
 
-    def _path(self, policy: Policy, course: Course) -> Path:
-        return self.out / f"{policy.gait}-{course.name}-{self.seed}.npz"
+    def _path(self, gait: str, course: Course) -> Path:
+        return self.out / f"{gait}-{course.name}-{self.seed}.npz"
 
-    def _kept(self, asked: Sequence[tuple[Policy, Course]]) -> dict[Path, dict[str, Any]]:
-        """What is told of the logs that are there already, each as long and of as many as asked.
+    def _controller(self, name: str, n: int) -> Controller:
+        return controller_maker(self.controller)([name], n, robot=self.read_robot())
+
+    def _record(self, name: str, gait: str, course: Course, report: Report) -> Row:
+        """Records a log and writes it."""
+        controller = self._controller(name, self.robots)
+        log = run_course(controller, course, seconds=self.seconds, seed=self.seed, report=report)
+        path = self._path(gait, course)
+        log.save(path)
+        return _row(path, log)
+
+    def _found(self, asked: Sequence[tuple[str, Course]]) -> dict[Path, Row]:
+        """Rows of the logs that are there already, each as long and of as many robots as asked.
 
         Raises:
             GaitshiftError: one holds something else.
         """
-        kept: dict[Path, dict[str, Any]] = {}
+        found: dict[Path, Row] = {}
         steps = RolloutConfig(seconds=self.seconds).steps
-        for policy, course in asked:
-            path = self._path(policy, course)
+        for gait, course in asked:
+            path = self._path(gait, course)
             if self.overwrite or not path.exists():
                 continue
             log = Log.load(path)
@@ -114,17 +127,17 @@ class Record:
                     f"{path} has {robots} robots × {log.time[-1]:g} s, got {self.robots} × "
                     f"{self.seconds:g} s; give the same robots and seconds, or --overwrite"
                 )
-            kept[path] = _row(path, log)
-        return kept
+            found[path] = _row(path, log)
+        return found
 
 
-def _row(path: Path, log: Log) -> dict[str, Any]:
+def _row(path: Path, log: Log) -> Row:
     last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
-    x = np.take_along_axis(log.qpos[..., 0].astype(float), last[None], axis=0)[0]
+    x = np.take_along_axis(log.truth.base_position_w[..., 0].astype(float), last[None], axis=0)[0]
     return {
         "log": str(path),
         "terrain": log.terrain,
         "robots": log.fallen.shape[1],
         "fallen": int(log.fallen[-1].sum()),
-        "km": float((x - log.qpos[0, :, 0]).sum() / 1000.0),
+        "km": float((x - log.truth.base_position_w[0, :, 0]).sum() / 1000.0),
     }

@@ -8,11 +8,12 @@ from typing import Annotated
 import tyro
 
 from gaitshift.cli.output import progress, say
+from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
 from gaitshift.lab.log import Log
-from gaitshift.robot.robot_file import use_robot_file
+from gaitshift.robot.description import Robot
 
 _TRACK, _SECONDS = "flat@5,perlin:0.1@12", 9.0
 """What policies of a training are shown on."""
@@ -22,7 +23,7 @@ _CHECKPOINTS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class Report(RobotOption):
     """Make one self-contained page of a log or of a training run.
 
     The page of a log shows the robot in 3D, its signals and its gaits. The page of a training shows
@@ -36,8 +37,6 @@ class Report:
     """HTML file; by default LOG.html beside the log, or report.html in the training's folder."""
     robot: int = 0
     """Index of the robot in the log, from 0."""
-    robot_file: Path | None = None
-    """Robot file that was given to `train`, if the robot is not ANYmal B."""
     video: Path | None = None
     """mp4 file to include."""
     overwrite: bool = False
@@ -45,7 +44,7 @@ class Report:
 
     def run(self) -> None:
         """Writes the page."""
-        use_robot_file(self.robot_file)
+        description = self.read_robot()
         is_run = self.source.is_dir()
         default = self.source / "report.html" if is_run else self.source.with_suffix(".html")
         log = None if is_run else Log.load(self.source)
@@ -57,14 +56,14 @@ class Report:
         if not path.parent.is_dir():
             raise GaitshiftError(f"no folder {path.parent} for the page")
         if log is None:
-            self._tell_training(path)
+            self._tell_training(path, description)
         else:
             from gaitshift.show.report import write_report  # matplotlib is slow to import
 
-            write_report(log, path, robot=self.robot, video=self.video)
+            write_report(log, path, robot=self.robot, description=description, video=self.video)
         print(path)
 
-    def _tell_training(self, path: Path) -> None:
+    def _tell_training(self, path: Path, robot: Robot) -> None:
         from gaitshift.show.report import write_training_report
 
         final = self.source / "policy.onnx"
@@ -73,13 +72,14 @@ class Report:
                 f"{self.source} must be a log or the folder of a training that finished or was "
                 "stopped by Ctrl-C, got a folder without policy.onnx"
             )
-        policy = policies.load(final)
+        policy = policies.load(final, robot)
         walks = [*_checkpoints(self.source), ("at the end", _walk(policy))]
         iterations = policy.info.training["iterations"]
         write_training_report(
             self.source,
             path,
             walks[::-1],
+            robot,
             title=f"Training of {policy.machine.title}",
             summary=f"{iterations} iterations, {policy.info.training['steps']:,} control steps",
         )
@@ -107,6 +107,6 @@ def _checkpoints(folder: Path) -> list[tuple[str, Log]]:
         for done, iteration in enumerate(chosen):
             path = Path(scratch) / "policy.onnx"
             run.write_policy_at(iteration, path)
-            walks.append((f"iteration {iteration}", _walk(policies.load(path))))
+            walks.append((f"iteration {iteration}", _walk(policies.load(path, run.robot))))
             report(done + 1, count)
     return walks

@@ -44,8 +44,7 @@ class Reproduce:
         try:
             from gaitshift.lab.reproduction.plan import Plan
             from gaitshift.lab.reproduction.pool import train_all
-            from gaitshift.lab.reproduction.results import Results
-            from gaitshift.lab.reproduction.told import Told
+            from gaitshift.lab.reproduction.results import EarlierRuns, Results
             from gaitshift.show.report.reproduction import write_report
         except ImportError as error:
             raise GaitshiftError(
@@ -60,12 +59,12 @@ class Reproduce:
             if not there.is_dir():
                 raise GaitshiftError(f"--out and --runs must be a folder, got the file {there}")
         plan = Plan.tiny(self.seed) if self.quick else Plan(seed=self.seed)
-        told = Told.read(plan, out) if self.add else Told()
-        wanted = [job for job in plan.select(self.only) if job.name not in told.courses]
+        earlier = EarlierRuns.read(plan, out) if self.add else EarlierRuns()
+        wanted = [job for job in plan.select(self.only) if job.name not in earlier.curves]
         with progress(f"{len(wanted)} runs") as report:
             train_all(wanted, runs, self.jobs, report)
         with progress("judging") as report:
-            written = write_report(Results.read(plan, runs, told), runs, out, told, report)
+            written = write_report(Results.read(plan, runs, earlier), runs, out, earlier, report)
         _say_broken(written)
         if self.json:
             emit_json(written)

@@ -3,21 +3,29 @@
 import shlex
 import sys
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gaitshift.cli.growing import README, check_numbers, kept_rows
-from gaitshift.cli.output import emit_json, emit_table, progress, say
-from gaitshift.control import policy as policies
+from gaitshift.cli.output import (
+    README,
+    check_numbers,
+    check_table_folder,
+    emit_json,
+    emit_table,
+    progress,
+    say,
+)
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.table import write_rows
-from gaitshift.shift import CONDITIONS
+from gaitshift.lab.resume import Report, ResumableTable, run_missing
+from gaitshift.table import Row
 
 TABLE = "crossings.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
+class Study(RobotOptions):
     """Compare robots on rough ground: in either gait alone, and with shifts by each condition.
 
     Reports survival, distance, speed and cost of transport with intervals, and those of an oracle
@@ -28,9 +36,9 @@ class Study:
     flat_gait: str = "trot"
     """Gait on flat ground."""
     rough_gait: str = "bound"
-    """Gait on rough ground."""
-    conditions: tuple[str, ...] = tuple(CONDITIONS)
-    """Shift conditions."""
+    """The gait for rough ground."""
+    conditions: tuple[str, ...] = ("terrain", "height_difference", "paper")
+    """Shipped gait graphs of two gaits, or TOML files."""
     amplitudes: tuple[float, ...] = (0.0, 0.05, 0.10, 0.15, 0.20, 0.25)
     """Amplitudes of the Perlin noise [m]."""
     runs: int = 512
@@ -47,8 +55,8 @@ class Study:
     def run(self) -> None:
         """Crosses, and tells what came of it."""
         try:
-            from gaitshift.lab.studies.crossing import cross, ways
-            from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, is_of, page, row_of
+            from gaitshift.lab.studies.crossing import Strategy, cross, strategies
+            from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, page, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"study needs the package '{error.name}'; install gaitshift[identify]"
@@ -57,33 +65,37 @@ class Study:
         for amplitude in self.amplitudes:
             if not 0 <= amplitude <= 1:
                 raise GaitshiftError(f"amplitudes must be 0 to 1 m, got {amplitude:g}")
-        every = ways(self.flat_gait, self.rough_gait, self.conditions)
-        loaded = {gait: policies.load(gait) for gait in (self.flat_gait, self.rough_gait)}
+        every = strategies(self.flat_gait, self.rough_gait, self.conditions)
+        loaded = self.load_policies((self.flat_gait, self.rough_gait))
         path = self.out / TABLE
-        rows = kept_rows(
+        check_table_folder(path, overwrite=self.overwrite)
+        table = ResumableTable.open(
             path,
             COLUMNS,
             "crossings",
+            key=("amplitude", "way"),
+            same={"seed": self.seed, "runs": self.runs},
             overwrite=self.overwrite,
-            alike={"seed": self.seed, "runs": self.runs},
         )
-        for amplitude in self.amplitudes:
-            for way in every:
-                if any(is_of(row, way, amplitude) for row in rows):
-                    say(f"{way.name} at {amplitude:g} m exists, not repeated")
-                    continue
-                with progress(f"{way.name}, {amplitude:g} m") as report:
-                    crossings = cross(
-                        loaded,
-                        way,
-                        amplitude=amplitude,
-                        runs=self.runs,
-                        seed=self.seed,
-                        report=report,
-                    )
-                rows.append(row_of(way, amplitude, self.seed, crossings))
-                write_rows(path, COLUMNS, rows)
-        from gaitshift.show.plots.crossings import crossings_figure  # matplotlib is slow to import
+
+        def crossed(way: Strategy, amplitude: float, report: Report) -> Row:
+            crossings = cross(
+                loaded, way, amplitude=amplitude, runs=self.runs, seed=self.seed, report=report
+            )
+            return row_of(way, amplitude, self.seed, crossings)
+
+        parts = [
+            table.part(
+                (amplitude, way.name),
+                f"{way.name} at {amplitude:g} m",
+                partial(crossed, way, amplitude),
+            )
+            for amplitude in self.amplitudes
+            for way in every
+        ]
+        run_missing(parts, progress=progress, say=say)
+        rows = table.rows
+        from gaitshift.show.plots.studies import crossings_figure  # matplotlib is slow to import
 
         crossings_figure(rows, self.out / PICTURE)
         command = shlex.join(["gaitshift", *sys.argv[1:]])

@@ -12,17 +12,18 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from gaitshift.cli.output import emit_json, say
+from gaitshift.cli.robot_options import RobotOption
+from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import glance
-from gaitshift.robot.robot_file import use_robot_file
+from gaitshift.lab.evaluation import flat_verdict
 
 if TYPE_CHECKING:
     from gaitshift.learn.run import Row, Run
 
 
 @dataclass(frozen=True, kw_only=True)
-class Train:
+class Train(RobotOption):
     """Train a gait with PPO: flat ground first, then rough ground with pushes.
 
     Writes config.json, progress.csv, verdicts.csv (a short evaluation at each checkpoint),
@@ -31,10 +32,9 @@ class Train:
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
     """Name of a gait (see `gaitshift gaits`) or a machine file (.toml)."""
-    preset: Literal["default", "paper"] = "default"
-    """Training recipe: ours, or the paper's (Table I, 30 robots, Kp 3, Kd 0.2, flat ground)."""
-    robot_file: Path | None = None
-    """Robot file (.toml, beside its MJCF file); ANYmal B by default."""
+    preset: Literal["default", "two-stage", "paper"] = "default"
+    """Training recipe: ours; two-stage, ours before it had a third stage; or the paper's (Table I,
+    30 robots, Kp 3, Kd 0.2, flat ground)."""
     robots: int | None = None
     """Number of robots in parallel; by default that of the recipe."""
     iterations: int | None = None
@@ -91,7 +91,7 @@ class Train:
             )
         if self.seed < 0:
             raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
-        machine, robot = gaits.load(self.gait), use_robot_file(self.robot_file)
+        machine, robot = gaits.load(self.gait), self.read_robot()
         recipe = PRESETS[self.preset]()
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)
@@ -120,7 +120,7 @@ class _Bar:
     """Progress of a training: steps/s, speed, survival, the last verdict and time left."""
 
     def __init__(self, run: "Run") -> None:
-        from gaitshift.learn.lines import last
+        from gaitshift.learn.progress import last
         from gaitshift.learn.run import PROGRESS, VERDICTS
 
         self.row: Row = last(run.folder / PROGRESS, run.iteration)
@@ -153,7 +153,7 @@ class _Bar:
 
     def judge(self, path: Path) -> "Row":
         """A short look at the policy as it stands."""
-        self.verdict = glance(path)
+        self.verdict = flat_verdict(policy.load(path, self._run.robot))
         return self.verdict
 
     def __call__(self, row: "Row") -> None:

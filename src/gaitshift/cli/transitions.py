@@ -3,24 +3,33 @@
 import shlex
 import sys
 from dataclasses import dataclass
+from functools import partial
 from itertools import permutations
 from pathlib import Path
 from typing import Annotated, Any
 
 import tyro
 
-from gaitshift.cli.growing import README, check_numbers, kept_rows
-from gaitshift.cli.output import emit_json, emit_table, progress, say
-from gaitshift.control import policy as policies
+from gaitshift.cli.output import (
+    README,
+    check_numbers,
+    check_table_folder,
+    emit_json,
+    emit_table,
+    progress,
+    say,
+)
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.table import write_rows
+from gaitshift.lab.resume import Report, ResumableTable, run_missing
 from gaitshift.sim.terrain import from_spec
+from gaitshift.table import Row
 
 TABLE, PAGE = "transitions.csv", "page.html"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Transitions:
+class Transitions(RobotOptions):
     """Test gait shifts of every ordered pair of gaits at random phases of the stride.
 
     A shift succeeds if the robot does not fall within 5 s and shows the new gait. Writes
@@ -29,7 +38,7 @@ class Transitions:
     """
 
     gaits: Annotated[tuple[str, ...], tyro.conf.Positional] = ("trot", "pace", "bound")
-    """Gaits; `all` for every shipped gait."""
+    """Gaits; `all` for every gait with a policy."""
     grounds: tuple[str, ...] = ("flat", "perlin:0.10")
     """Terrains, as in `evaluate --terrain`."""
     switches: int = 512
@@ -47,44 +56,51 @@ class Transitions:
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.lab.studies import Pair, run_pair
-            from gaitshift.lab.studies.transition_page import page
-            from gaitshift.lab.studies.transition_table import COLUMNS, is_of, row_of
+            from gaitshift.lab.studies.transition_table import COLUMNS, page, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        names = policies.shipped() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
+        names = self.known_gaits() if self.gaits == ("all",) else tuple(dict.fromkeys(self.gaits))
         if len(names) < 2:
             raise GaitshiftError(f"gaits must name two gaits or more, got {len(names)}")
         check_numbers("switches", self.switches, self.seed)
-        loaded = {name: policies.load(name) for name in names}
+        loaded = self.load_policies(names)
         for ground in self.grounds:
             from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # a fault is told at once
         path = self.out / TABLE
-        rows = kept_rows(
+        check_table_folder(path, overwrite=self.overwrite)
+        table = ResumableTable.open(
             path,
             COLUMNS,
             "shifts",
+            key=("old", "new", "ground"),
+            same={"seed": self.seed, "switches": self.switches},
             overwrite=self.overwrite,
-            alike={"seed": self.seed, "switches": self.switches},
         )
-        for ground in self.grounds:
-            for old, new in permutations(names, 2):
-                pair = Pair(old, new)
-                if any(is_of(row, pair, ground) for row in rows):
-                    say(f"{old} to {new} on {ground} exists, not repeated")
-                    continue
-                with progress(f"{old} to {new}, {ground}") as report:
-                    outcomes = run_pair(
-                        loaded,
-                        pair,
-                        ground=ground,
-                        switches=self.switches,
-                        seed=self.seed,
-                        report=report,
-                    )
-                rows.append(row_of(pair, ground, self.seed, outcomes))
-                write_rows(path, COLUMNS, rows)
+
+        def shifted(pair: Pair, ground: str, report: Report) -> Row:
+            outcomes = run_pair(
+                loaded,
+                pair,
+                ground=ground,
+                switches=self.switches,
+                seed=self.seed,
+                report=report,
+            )
+            return row_of(pair, ground, self.seed, outcomes)
+
+        parts = [
+            table.part(
+                (old, new, ground),
+                f"{old} to {new} on {ground}",
+                partial(shifted, Pair(old, new), ground),
+            )
+            for ground in self.grounds
+            for old, new in permutations(names, 2)
+        ]
+        run_missing(parts, progress=progress, say=say)
+        rows = table.rows
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
         (self.out / README).write_text(page(rows, command))
@@ -98,8 +114,8 @@ class Transitions:
 
     def _draw(self, rows: list[dict[str, Any]]) -> None:
         """A map a ground, of all that the table has."""
-        from gaitshift.lab.studies.transition_page import picture_of
-        from gaitshift.show.plots.transitions import transition_map  # matplotlib is slow to import
+        from gaitshift.lab.studies.transition_table import picture_of
+        from gaitshift.show.plots.studies import transition_map  # matplotlib is slow to import
 
         for ground in dict.fromkeys(row["ground"] for row in rows):
             of = [row for row in rows if row["ground"] == ground]

@@ -7,19 +7,18 @@ from typing import Annotated
 import tyro
 
 from gaitshift.cli.output import say
-from gaitshift.control import policy as policies
+from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import DemoConfig
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ANYMAL_B
-from gaitshift.robot.robot_file import use_robot_file
-from gaitshift.shift import load_condition
+from gaitshift.robot.description import ANYMAL_B, Robot
+from gaitshift.shift.graph_file import DEFAULT
 
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class View(RobotOptions):
     """Show robots in the browser: a live simulation with controls, or a log.
 
     Prints the address of the page; Ctrl-C ends it. Needs no display and no OpenGL.
@@ -27,14 +26,12 @@ class View:
 
     log: Annotated[Path | None, tyro.conf.Positional] = None
     """Log of `demo`, `evaluate`, `record` or `view`; without it, a live simulation."""
-    robot_file: Path | None = None
-    """Robot file that was given to `train`, if the robot of the log is not ANYmal B."""
     track: str = DemoConfig.track
     """Terrain: pieces with lengths in metres."""
     robots: int = 1
-    """Number of robots, 1 to 16; charts show robot 0."""
-    condition: str = DemoConfig.condition
-    """Condition for shifts from trot to bound and back."""
+    """Robots on the track, 1 to 16; charts tell of the first."""
+    condition: str = DEFAULT
+    """When to shift from trot to bound and back, by the name of a shipped graph."""
     seed: int = 0
     """Seed of the terrain and the starts."""
     host: str = "127.0.0.1"
@@ -60,18 +57,20 @@ class View:
             raise GaitshiftError(
                 f"view needs the package '{error.name}'; install gaitshift[view]"
             ) from error
-        if not has_meshes(ANYMAL_B):
+        robot = self.read_robot()
+        if robot == ANYMAL_B and not has_meshes(robot):
             say("drawn with simple shapes; install gaitshift[meshes] (130 MB) for meshes")
         config = LiveConfig(
             track=self.track,
             robots=self.robots,
-            condition=load_condition(self.condition),
+            condition=self.condition,
             seed=self.seed,
         )
-        use_robot_file(self.robot_file)
         if self.log is None:
-            shipped = {name: policies.load(name) for name in _in_order(policies.shipped())}
-            shown = LiveRun(config, shipped)
+            gaits = tuple(dict.fromkeys((*self.known_gaits(), *config.graph.gaits)))
+            shown = LiveRun(config, self.load_policies(_in_order(gaits)))
+        elif self.policy_files:
+            raise GaitshiftError("a log is shown without policies: no --policy-files")
         else:
             shown = Log.load(self.log)
         if self.host not in _LOCAL:
@@ -79,9 +78,9 @@ class View:
         server = serve(self.host, self.port)
         try:
             if isinstance(shown, Log):
-                page = ReplayPage(server, shown)
+                page = ReplayPage(server, shown, robot)
             else:
-                page = LivePage(server, shown, self._save)
+                page = LivePage(server, shown, lambda log: self._save(log, robot))
             print(f"open http://{self.host}:{self.port} (Ctrl-C ends)", flush=True)
             page.run()
         except KeyboardInterrupt:
@@ -89,7 +88,7 @@ class View:
         finally:
             close(server)
 
-    def _save(self, log: Log) -> str:
+    def _save(self, log: Log, robot: Robot) -> str:
         """Keeps a recording as a log and as a page; older ones stay."""
         from gaitshift.show.report import write_report  # matplotlib is slow to import
 
@@ -99,7 +98,7 @@ class View:
             number += 1
         path, page = self.out / f"log-{number}.npz", self.out / f"run-{number}.html"
         log.save(path)
-        write_report(log, page)
+        write_report(log, page, description=robot)
         say(f"recorded {path} and {page}")
         return f"saved {page} and {path}; play the log with: gaitshift view {path}"
 

@@ -1,16 +1,19 @@
-"""Drives N robots, each in the gait of the moment: machine, observation, policy, joint target."""
+"""Drives N robots by trained policies, each in the gait of the moment."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from gaitshift.control.observation import Situation, last_touch
+from gaitshift.control import policy as policies
+from gaitshift.control.observation import GaitState
 from gaitshift.control.policy import Policy
+from gaitshift.control.repertoire import Repertoire
 from gaitshift.errors import GaitshiftError
-from gaitshift.robot.command import ACTION_LIMIT, Command
-from gaitshift.robot.description import Robot
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.command import Command
+from gaitshift.robot.description import ANYMAL_B, Robot
+from gaitshift.robot.state import Proprioception
 
 STUCK = 2.0
 """Strides for which a machine that a shift began may stand still before it has gone round once;
@@ -28,21 +31,47 @@ class Driver:
     """
 
     def __init__(self, policies: Mapping[str, Policy], n: int, *, start: str) -> None:
-        """All n robots begin in the gait `start`, in its machine's initial state."""
+        """All n robots begin in the gait `start`, in its machine's initial state.
+
+        Raises:
+            GaitshiftError: no policy for that gait, or policies of different robots or gains.
+        """
         self.policies = dict(policies)
-        self.gaits = tuple(self.policies)
-        self._check(start)
+        self._check()
+        infos = [policy.info for policy in self.policies.values()]
+        self.repertoire = Repertoire(
+            gaits=tuple(self.policies),
+            machines=tuple(policy.machine for policy in self.policies.values()),
+            forward_speed=np.array([info.forward_speed for info in infos]),
+            stride_frequency=np.array([info.stride_frequency for info in infos]),
+        )
         self.n = n
-        self._machines = tuple(policy.machine for policy in self.policies.values())
-        self.gait: Int[np.ndarray, " N"] = np.full(n, self.gaits.index(start))
-        self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        self.steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        first = self.repertoire.index(start)
+        self.gait: Int[np.ndarray, " N"] = np.full(n, first)
+        self.state = GaitState(
+            machine_state=np.full(n, self.repertoire.machines[first].initial),
+            steps_in_state=np.zeros(n, dtype=np.int64),
+            last_action=np.zeros((n, 12)),
+            touch_height=np.full((n, 4), np.nan),  # until feet are seen
+        )
+        """Where each robot is in its gait."""
         # Changes of state until a machine that a shift began has gone round once.
         self._changes_due: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
-        self._touch_height: Float[np.ndarray, "N 4"] | None = None  # until a motion is seen
         self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []
-        self.machine_state[:] = self._machines[self.gaits.index(start)].initial
+
+    @classmethod
+    def load(cls, gaits: Sequence[str], n: int, *, robot: Robot | None = None) -> "Driver":
+        """Drives by shipped policies of these gaits, or by policy files; begins in the first.
+
+        `robot` is what they are of; None: ANYmal B.
+        """
+        loaded = [policies.load(gait, robot or ANYMAL_B) for gait in dict.fromkeys(gaits)]
+        return cls({policy.gait: policy for policy in loaded}, n, start=loaded[0].gait)
+
+    @property
+    def machine_state(self) -> Int[np.ndarray, " N"]:
+        """State of each robot's machine."""
+        return self.state.machine_state
 
     @property
     def robot(self) -> Robot:
@@ -54,68 +83,53 @@ class Driver:
         """The preset of joint gains that all policies were trained with."""
         return next(iter(self.policies.values())).info.gains
 
-    def see(self, motion: Motion, command: Command) -> None:
+    def see(self, sensed: Proprioception, command: Command) -> None:
         """Moves every robot's machine on by what its feet did in the step that ended.
 
         `command` is the one that the robots acted on.
         """
-        self._touch_height = last_touch(motion, self._touch_height)
-        stride = command.stride
-        for index, ids in self._groups():
-            step = self._machines[index].step(
-                self.machine_state[ids],
-                motion.contact[ids],
-                self.steps_in_state[ids],
-                dwell=self._machines[index].dwell_for(stride[ids]),
-            )
-            self.machine_state[ids] = step.state
-            self.steps_in_state[ids] = np.where(step.changed, 0, self.steps_in_state[ids] + 1)
+        self._see_feet(sensed)
+        for index, ids in self.repertoire.groups(self.gait):
+            policy, whole = self.policies[self.repertoire.gaits[index]], len(ids) == self.n
+            before = self.state if whole else self.state.robots(ids)
+            felt, asked = (sensed, command) if whole else (sensed.robots(ids), command.of(ids))
+            after, step = policy.walker.step(before, before.last_action, felt, asked)
+            self.state = after if whole else self.state.with_robots(ids, after)
             self._changes_due[ids] -= step.changed
-            is_stuck = (self._changes_due[ids] > 0) & (
-                self.steps_in_state[ids] > STUCK * stride[ids]
-            )
-            self._begin(ids[is_stuck], index, self._machines[index].initial)
+            stood = after.steps_in_state > STUCK * asked.stride
+            is_stuck = (self._changes_due[ids] > 0) & stood
+            if is_stuck.any():
+                self._begin(ids[is_stuck], index, policy.machine.initial)
 
-    def switch(self, ids: Int[np.ndarray, " K"], gait: str, motion: Motion) -> None:
+    def switch(self, ids: Int[np.ndarray, " K"], gait: str, sensed: Proprioception) -> None:
         """Robots `ids` take up another gait at once; those already in it are left alone."""
-        self._check_known(gait)
-        index = self.gaits.index(gait)
+        index = self.repertoire.index(gait)
         ids = ids[self.gait[ids] != index]
         self.gait[ids] = index
-        self._begin(ids, index, self._machines[index].enter(motion.contact[ids]))
+        self._begin(ids, index, self.repertoire.machines[index].enter(sensed.contact[ids]))
 
     def _begin(
         self, ids: Int[np.ndarray, " K"], index: int, state: Int[np.ndarray, " K"] | int
     ) -> None:
         """The machines of these robots, of gait number `index`, begin in a state."""
-        self.machine_state[ids] = state
-        self.steps_in_state[ids] = 0
-        self._changes_due[ids] = len(self._machines[index].states)
+        machine_state, steps = self.state.machine_state.copy(), self.state.steps_in_state.copy()
+        machine_state[ids], steps[ids] = state, 0
+        self.state = replace(self.state, machine_state=machine_state, steps_in_state=steps)
+        self._changes_due[ids] = len(self.repertoire.machines[index].states)
 
-    def act(self, motion: Motion, command: Command) -> Float[np.ndarray, "N 12"]:
+    def act(self, sensed: Proprioception, command: Command) -> Float[np.ndarray, "N 12"]:
         """Joint targets [rad] for the next control step."""
-        target = np.empty((self.n, 12))
-        if self._touch_height is None:
-            self._touch_height = last_touch(motion)
+        self._see_feet(sensed)
+        target, last_action = np.empty((self.n, 12)), np.empty((self.n, 12))
         self._acted_on = []
-        for index, ids in self._groups():
-            policy = self.policies[self.gaits[index]]
-            whole = len(ids) == self.n
-            situation = Situation(
-                machine_state=self.machine_state[ids],
-                steps_in_state=self.steps_in_state[ids],
-                motion=motion if whole else motion.of(ids),
-                command=command if whole else command.of(ids),
-                last_action=self._last_action[ids],
-                stance=policy.robot.stance_angles,
-                touch_height=self._touch_height[ids],
-            )
-            observation = policy.observation(situation)
+        for index, ids in self.repertoire.groups(self.gait):
+            policy, whole = self.policies[self.repertoire.gaits[index]], len(ids) == self.n
+            state = self.state if whole else self.state.robots(ids)
+            felt, asked = (sensed, command) if whole else (sensed.robots(ids), command.of(ids))
+            observation = policy.walker.observe(state, felt, asked)
             self._acted_on.append((policy, ids, observation))
-            action = policy(observation).astype(np.float64)
-            action = np.clip(action, -ACTION_LIMIT, ACTION_LIMIT)
-            self._last_action[ids] = action
-            target[ids] = policy.target(action)
+            last_action[ids], target[ids] = policy.walker.target(policy(observation))
+        self.state = replace(self.state, last_action=last_action)
         return target
 
     def value(self) -> Float[np.ndarray, " N"] | None:
@@ -127,41 +141,20 @@ class Driver:
             value[ids] = policy.value(observation)
         return value
 
-    def own_command(self) -> Command:
-        """Straight ahead, at the nominal speed and stride frequency of each robot's gait."""
-        speed = np.array([policy.info.forward_speed for policy in self.policies.values()])
-        frequency = np.array([policy.info.stride_frequency for policy in self.policies.values()])
-        return Command(
-            forward_speed=speed[self.gait],
-            yaw_rate=np.zeros(self.n),
-            stride_frequency=frequency[self.gait],
-        )
+    def _see_feet(self, sensed: Proprioception) -> None:
+        """Feet that were never seen are taken as they stand."""
+        height = self.state.touch_height
+        if np.isnan(height).any():
+            height = np.where(np.isnan(height), sensed.foot_height, height)
+            self.state = replace(self.state, touch_height=height)
 
-    def stance_shown(self, motion: Motion) -> Bool[np.ndarray, " N"]:
-        """Whether the feet in contact are a stance set of each robot's present gait."""
-        shown = np.empty(self.n, dtype=bool)
-        for index, ids in self._groups():
-            shown[ids] = self._machines[index].shows_stance(motion.contact[ids])
-        return shown
-
-    def _groups(self) -> list[tuple[int, Int[np.ndarray, " K"]]]:
-        """Which robots use which gait, for the gaits in use."""
-        first = int(self.gait[0])
-        if (self.gait == first).all():
-            return [(first, np.arange(self.n))]
-        return [(int(index), np.flatnonzero(self.gait == index)) for index in np.unique(self.gait)]
-
-    def _check_known(self, gait: str) -> None:
-        if gait not in self.policies:
-            raise GaitshiftError(f"gait must be one of {', '.join(self.gaits)}, got '{gait}'")
-
-    def _check(self, start: str) -> None:
-        self._check_known(start)
-        infos = [policy.info for policy in self.policies.values()]
-        for name, info in zip(self.gaits, infos, strict=True):
-            if (info.robot, info.gains) != (infos[0].robot, infos[0].gains):
+    def _check(self) -> None:
+        named = [(gait, policy.info) for gait, policy in self.policies.items()]
+        for gait, info in named:
+            first_gait, first = named[0]
+            if (info.robot, info.gains) != (first.robot, first.gains):
                 raise GaitshiftError(
-                    f"the policy of {name} is for {info.robot} with gains '{info.gains}', that of "
-                    f"{self.gaits[0]} for {infos[0].robot} with gains '{infos[0].gains}'; "
-                    "both policies must be for the same robot and gains"
+                    f"policies must be of one robot and its gains, got {info.robot} with gains "
+                    f"'{info.gains}' for {gait}, {first.robot} with gains '{first.gains}' for "
+                    f"{first_gait}"
                 )

@@ -8,6 +8,7 @@ feet last touched, by which a policy knows rough ground from flat.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -16,41 +17,38 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import Command
 from gaitshift.robot.legs import MIRRORED_LEGS
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.state import Batch, Proprioception
 
 
-@dataclass(frozen=True, kw_only=True)
-class Situation:
-    """All that an observation may show of N robots at one instant."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GaitState(Batch):
+    """Where N robots are in their gait: the paper's u and δ, and what they did and met last."""
 
-    machine_state: Int[np.ndarray, " N"]
-    steps_in_state: Int[np.ndarray, " N"]
-    motion: Motion
-    command: Command
-    last_action: Float[np.ndarray, "N 12"]
+    machine_state: Int[np.ndarray, "*batch"]
+    """u, the state of the gait's machine."""
+    steps_in_state: Int[np.ndarray, "*batch"]
+    """δ, control steps since its last change."""
+    last_action: Float[np.ndarray, "*batch 12"]
     """The action that led here, zero after a reset."""
+    touch_height: Float[np.ndarray, "*batch 4"]
+    """Height of each foot above the base when it last touched, along the vertical [m].
+
+    The paper's h (III-E), by which a policy knows rough ground from flat."""
+
+
+class _Instant(NamedTuple):
+    """What an observation is made of, of N robots at one instant."""
+
+    state: GaitState
+    sensed: Proprioception
+    command: Command
     stance: Float[np.ndarray, " 12"]
-    """The robot's default joint angles [rad]."""
-    touch_height: Float[np.ndarray, "N 4"]
-    """Height of each foot from the base when it last touched [m], as `last_touch` keeps it."""
-
-
-def last_touch(
-    motion: Motion, before: Float[np.ndarray, "N 4"] | None = None
-) -> Float[np.ndarray, "N 4"]:
-    """Height of each foot from the base when it last touched, along the vertical [m].
-
-    The paper's h (III-E), which the shift condition watches, as something the policy sees too.
-    `before` is what it was a step ago; None: every foot is taken as it stands now.
-    """
-    height = motion.foot_height
-    return height.copy() if before is None else np.where(motion.contact, height, before)
 
 
 @dataclass(frozen=True)
 class _Slice:
     size: int
-    read: Callable[[Situation], np.ndarray]
+    read: Callable[[_Instant], np.ndarray]
     mirror: tuple[tuple[int, ...], tuple[int, ...]]
     """Order and signs of the entries as seen in a mirror (left and right changed)."""
 
@@ -68,8 +66,12 @@ TOUCH_SCALE = 10.0
 """Differences of touch heights are shown in units of 10 cm and saturate at 4 units: ours."""
 
 
-def _touch_differences(s: Situation) -> np.ndarray:
-    difference = s.touch_height - s.touch_height.mean(axis=1, keepdims=True)
+def _sensed(s: _Instant, name: str) -> np.ndarray:
+    return s.sensed.need(name, "the policy")
+
+
+def _touch_differences(s: _Instant) -> np.ndarray:
+    difference = s.state.touch_height - s.state.touch_height.mean(axis=1, keepdims=True)
     return np.clip(TOUCH_SCALE * difference, -4.0, 4.0)
 
 
@@ -77,38 +79,38 @@ def _machine_slice(machine: RewardMachine) -> _Slice:
     count = len(machine.states)
     one_hot = np.eye(count)
     mirrored = machine.mirrored_states() or tuple(range(count))
-    return _Slice(count, lambda s: one_hot[s.machine_state], (mirrored, (1,) * count))
+    return _Slice(count, lambda s: one_hot[s.state.machine_state], (mirrored, (1,) * count))
 
 
 def _wait_slice(machine: RewardMachine) -> _Slice:
-    def read(s: Situation) -> np.ndarray:
+    def read(s: _Instant) -> np.ndarray:
         dwell = machine.dwell_for(s.command.stride)
-        return STEP_SCALE * machine.wait(s.machine_state, s.steps_in_state, dwell)
+        return STEP_SCALE * machine.wait(s.state.machine_state, s.state.steps_in_state, dwell)
 
     return _column(read)
 
 
-def _column(read: Callable[[Situation], np.ndarray], sign: int = 1) -> _Slice:
+def _column(read: Callable[[_Instant], np.ndarray], sign: int = 1) -> _Slice:
     return _Slice(1, lambda s: read(s)[:, None], ((0,), (sign,)))
 
 
-def _vector(read: Callable[[Situation], np.ndarray], *signs: int) -> _Slice:
+def _vector(read: Callable[[_Instant], np.ndarray], *signs: int) -> _Slice:
     return _Slice(len(signs), read, (tuple(range(len(signs))), signs))
 
 
 _SLICES: dict[str, _Slice] = {
-    "steps_in_state": _column(lambda s: np.minimum(STEP_SCALE * s.steps_in_state, 5.0)),
-    "joint_position": _Slice(12, lambda s: s.motion.joint_position - s.stance, JOINT_MIRROR),
-    "joint_velocity": _Slice(12, lambda s: 0.1 * s.motion.joint_velocity, JOINT_MIRROR),
-    "base_height": _column(lambda s: s.motion.base_height),
-    "gravity_b": _vector(lambda s: s.motion.gravity_b, 1, -1, 1),
-    "base_linear_velocity_b": _vector(lambda s: s.motion.base_linear_velocity_b, 1, -1, 1),
-    "base_angular_velocity_b": _vector(lambda s: s.motion.base_angular_velocity_b, -1, 1, -1),
-    "contact": _Slice(4, lambda s: s.motion.contact, (MIRRORED_LEGS, (1,) * 4)),
+    "steps_in_state": _column(lambda s: np.minimum(STEP_SCALE * s.state.steps_in_state, 5.0)),
+    "joint_position": _Slice(12, lambda s: _sensed(s, "joint_position") - s.stance, JOINT_MIRROR),
+    "joint_velocity": _Slice(12, lambda s: 0.1 * _sensed(s, "joint_velocity"), JOINT_MIRROR),
+    "base_height": _column(lambda s: s.sensed.base_height),
+    "gravity_b": _vector(lambda s: s.sensed.gravity_b, 1, -1, 1),
+    "base_linear_velocity_b": _vector(lambda s: _sensed(s, "velocity_b"), 1, -1, 1),
+    "base_angular_velocity_b": _vector(lambda s: _sensed(s, "angular_velocity_b"), -1, 1, -1),
+    "contact": _Slice(4, lambda s: s.sensed.contact, (MIRRORED_LEGS, (1,) * 4)),
     "forward_speed_command": _column(lambda s: s.command.forward_speed),
     "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
     "stride_command": _column(lambda s: STEP_SCALE * s.command.stride),
-    "last_action": _Slice(12, lambda s: s.last_action, JOINT_MIRROR),
+    "last_action": _Slice(12, lambda s: s.state.last_action, JOINT_MIRROR),
     "touch_height": _Slice(4, _touch_differences, (MIRRORED_LEGS, (1,) * 4)),
 }
 
@@ -144,6 +146,8 @@ class Observation:
     """Which slices are observed, in which order, for one machine."""
 
     machine: RewardMachine
+    stance: tuple[float, ...]
+    """The robot's default joint angles, from which joint positions are observed [rad]."""
     names: tuple[str, ...] = DEFAULT_SLICES
 
     def __post_init__(self) -> None:
@@ -175,13 +179,20 @@ class Observation:
         """Length of the observation vector."""
         return sum(part.size for part in self._parts)
 
-    def __call__(self, situation: Situation) -> Float32[np.ndarray, "N D"]:
+    def __call__(
+        self, state: GaitState, sensed: Proprioception, command: Command
+    ) -> Float32[np.ndarray, "N D"]:
         """The observation of N robots."""
-        n = len(situation.machine_state)
-        observation = np.empty((n, self.size), dtype=np.float32)
+        instant = _Instant(state, sensed, command, self.stance_angles)
+        observation = np.empty((len(state.machine_state), self.size), dtype=np.float32)
         for part, where in zip(self._parts, self.slices.values(), strict=True):
-            observation[:, where] = part.read(situation)
+            observation[:, where] = part.read(instant)
         return observation
+
+    @cached_property
+    def stance_angles(self) -> Float[np.ndarray, " 12"]:
+        """`stance` as an array [rad]."""
+        return np.array(self.stance)
 
     @cached_property
     def mirror(self) -> tuple[Int[np.ndarray, " D"], Float32[np.ndarray, " D"]]:

@@ -7,14 +7,15 @@ from typing import Any, cast
 
 import numpy as np
 import onnxruntime
-from jaxtyping import Float, Float32
+from jaxtyping import Float32
 
 from gaitshift.control.observation import Observation
 from gaitshift.control.policy_info import PolicyInfo, read_info
+from gaitshift.control.walker import Walker
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ROBOTS, Robot
+from gaitshift.robot.description import ANYMAL_B, Robot
 
 _SHIPPED = Path(__file__).parent / "policies"
 
@@ -30,11 +31,8 @@ class Policy:
     info: PolicyInfo
     machine: RewardMachine
     session: onnxruntime.InferenceSession
-
-    @property
-    def robot(self) -> Robot:
-        """The robot it drives."""
-        return ROBOTS[self.info.robot]
+    robot: Robot
+    """The robot that it drives."""
 
     @property
     def gait(self) -> str:
@@ -44,7 +42,16 @@ class Policy:
     @cached_property
     def observation(self) -> Observation:
         """The observation it wants."""
-        return Observation(self.machine, tuple(self.info.observation))
+        return Observation(self.machine, tuple(self.info.stance), tuple(self.info.observation))
+
+    @cached_property
+    def walker(self) -> Walker:
+        """Its gait at work."""
+        return Walker(
+            machine=self.machine,
+            observation=self.observation,
+            action_scale=self.info.action_scale,
+        )
 
     def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
         """The deterministic actions for N observations."""
@@ -69,22 +76,23 @@ class Policy:
         options = _ONLY_WHAT_IS_ASKED
         return cast(Any, self.session).run([output], {"observation": observation}, options)[0]
 
-    def target(self, action: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "N 12"]:
-        """Joint targets [rad] of an action."""
-        return np.asarray(self.info.stance) + self.info.action_scale * action
-
 
 def shipped() -> tuple[str, ...]:
     """Names of the gaits whose policies come with the package."""
     return tuple(sorted(path.stem for path in _SHIPPED.glob("*.onnx")))
 
 
-def load(name_or_path: str | Path) -> Policy:
-    """A shipped policy by the name of its gait, or any policy file.
+def record_file(gait: str) -> Path:
+    """The file that says how a shipped policy was trained: preset, seed, figures."""
+    return _SHIPPED / f"{gait}.json"
+
+
+def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
+    """A shipped policy by the name of its gait, or any policy file, for this robot.
 
     Raises:
         GaitshiftError: no such policy; not a whole ONNX file; not one of gaitshift's; of another
-            format version or robot; or its parts contradict each other.
+            format version or of another robot; or its parts contradict each other.
     """
     path = Path(name_or_path)
     if path.suffix != ".onnx":
@@ -94,12 +102,16 @@ def load(name_or_path: str | Path) -> Policy:
                 f"policy must be one of {', '.join(shipped())} or a .onnx file, got "
                 f"'{name_or_path}'"
             )
+        if robot != ANYMAL_B:
+            raise GaitshiftError(
+                f"'{robot.name}' has no policy for the gait '{name_or_path}'; give its .onnx file"
+            )
     if not path.is_file():
         raise GaitshiftError(f"no policy file {path}")
     session = _open(path)
     info = read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
     try:
-        policy = Policy(path, info, RewardMachine.from_dict(info.machine), session)
+        policy = Policy(path, info, RewardMachine.from_dict(info.machine), session, robot)
         _check(policy)
     except GaitshiftError as error:
         raise GaitshiftError(f"{path}: {error}") from error
@@ -119,7 +131,7 @@ def _open(path: Path) -> onnxruntime.InferenceSession:
 
 
 def _check(policy: Policy) -> None:
-    """Refuses a policy whose robot is unknown or whose parts contradict each other."""
+    """Refuses a policy of another robot, or whose parts contradict each other."""
     info = policy.info
     session: Any = policy.session
     inputs, outputs = (
@@ -135,11 +147,7 @@ def _check(policy: Policy) -> None:
         raise GaitshiftError(
             f"the network must give 12 actions, one for each joint, got {outputs['action'][1]}"
         )
-    if info.robot not in ROBOTS:
-        raise GaitshiftError(
-            f"robot must be one of {', '.join(ROBOTS)}, got '{info.robot}'; give another robot "
-            "with --robot-file"
-        )
+    policy.robot.check_is(info.robot, "it")
     if info.control_rate != 1.0 / CONTROL_PERIOD:
         raise GaitshiftError(
             f"control_rate must be {1.0 / CONTROL_PERIOD:g} Hz, got {info.control_rate:g}"

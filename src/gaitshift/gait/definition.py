@@ -10,12 +10,16 @@ from jaxtyping import Float, Int
 
 from gaitshift.data import Table, located
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait.check import check, check_lockout
-from gaitshift.gait.cycle import cycle, shares, stride, touchdowns
-from gaitshift.gait.edge import Edge, check_swing_height
-from gaitshift.gait.guard import check_dwell
-from gaitshift.gait.mirror import mirrored_states
-from gaitshift.gait.state import State
+from gaitshift.gait.elements import State, Transition, check_dwell, check_swing_height
+from gaitshift.gait.laws import (
+    check,
+    check_lockout,
+    cycle,
+    mirrored_states,
+    shares,
+    stride,
+    touchdowns,
+)
 from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED
 from gaitshift.robot.legs import LEGS, MIRRORED_LEGS
 
@@ -58,7 +62,7 @@ class Definition:
     states: tuple[State, ...]
     """U and F."""
 
-    edges: tuple[Edge, ...]
+    edges: tuple[Transition, ...]
     """δu and δr."""
 
     dwell: int
@@ -195,7 +199,7 @@ class Definition:
                 for number, one in enumerate(table.tables("state"), start=1)
             ),
             edges=tuple(
-                Edge.from_dict(one, number=number, dwell=dwell, swing_height=swing_height)
+                Transition.from_dict(one, number=number, dwell=dwell, swing_height=swing_height)
                 for number, one in enumerate(table.tables("transition"), start=1)
             ),
             dwell=dwell,

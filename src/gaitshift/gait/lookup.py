@@ -5,9 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.gait.edge import Edge
-from gaitshift.gait.feet import feet_label
-from gaitshift.gait.state import State
+from gaitshift.gait.elements import State, Transition, feet_label
 from gaitshift.robot.legs import LABEL_COUNT, LEGS, contact_of
 
 
@@ -20,7 +18,7 @@ class Lookup:
     """
 
     edge: Int[np.ndarray, " states_x_16"]
-    """Edge that suits state u and label l, at index 16 u + l."""
+    """Transition that suits state u and label l, at index 16 u + l."""
 
     target: Int[np.ndarray, " rows"]
     """State the edge leads to."""
@@ -66,7 +64,9 @@ class Lookup:
     """State whose stance agrees with a label on most feet, the lowest where several do."""
 
     @classmethod
-    def of(cls, states: tuple[State, ...], edges: tuple[Edge, ...], *, dwell: int) -> "Lookup":
+    def of(
+        cls, states: tuple[State, ...], edges: tuple[Transition, ...], *, dwell: int
+    ) -> "Lookup":
         """Build the arrays of a checked machine whose own dwell is `dwell` [control steps]."""
         index = {state.name: u for u, state in enumerate(states)}
         suits = np.full((len(states), LABEL_COUNT), len(edges))

@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from gaitshift.data import located, tables_in
 from gaitshift.gait.definition import Definition
 from gaitshift.gait.lookup import Lookup
 from gaitshift.robot.legs import LABEL_COUNT, label_of
@@ -172,3 +174,13 @@ class RewardMachine(Definition):
     @cached_property
     def _lookup(self) -> Lookup:
         return Lookup.of(self.states, self.edges, dwell=self.dwell)
+
+
+def read_toml(path: Path) -> RewardMachine:
+    """Read the machine in a TOML file, checked in full.
+
+    Raises `GaitshiftError` with one line that begins with the file's path, and names the line
+    where TOML itself is broken and the table where the machine is.
+    """
+    with located(str(path)):
+        return RewardMachine.from_dict(tables_in(path))

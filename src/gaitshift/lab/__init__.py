@@ -1,1 +1,1 @@
-"""Evidence: logs, rollouts, gait figures, trials, identification, studies, benchmarks."""
+"""Experiments: logs, rollouts, gait figures, trials, identification, studies, benchmarks."""

@@ -1,56 +1,52 @@
-"""What a run of N robots left behind, step by step: the one format of `--log FILE.npz`."""
+"""The log of a run of N robots, step by step: the format of `--log FILE.npz`."""
 
 import zipfile
 import zlib
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.log_check import TIMELESS, checked
+from gaitshift.lab.log_check import checked
+from gaitshift.robot.state import Batch, Privileged, Proprioception
+
+FORMAT_VERSION = 2
+"""Increased when an earlier file could be misread. 1 (gaitshift 0.1) held MuJoCo's qpos, qvel."""
+
+_RECORDS: Mapping[str, type[Any]] = {"sensed": Proprioception, "truth": Privileged}
+"""Records of a log; in a file their arrays are named `sensed.contact` and so on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Log:
-    """T control steps of N robots. Time comes first, then the robot, then the leg or joint.
+class Log(Batch):
+    """T control steps of N robots: proprioception, privileged state, and decisions.
 
-    Entry t is the motion after control step t: what the controllers saw before their next action.
-    Positions, velocities, torques and heights may be kept in single precision: 4 µm at 50 m.
+    Axes are time, robot, then leg or joint; `log[t]` is a step, and `log[a:b]` some of the steps.
+    Entry t is the state after control step t, which the controllers saw before their next action.
+    Numbers may be in single precision, which resolves 4 µm at 50 m.
     """
 
-    time: Float[np.ndarray, " T"]
-    """[s] from the start of the run."""
-    qpos: Float[np.ndarray, "T N 19"]
-    """MuJoCo's positions: base position [m], base quaternion (w, x, y, z), joint angles [rad]."""
-    qvel: Float[np.ndarray, "T N 18"]
-    """Base velocity, world frame [m/s]; its angular velocity, body frame, and joints [rad/s]."""
-    torque: Float[np.ndarray, "T N 12"]
-    """Joint torques [N·m]."""
-    contact: Bool[np.ndarray, "T N 4"]
-    """Whether each foot touches."""
-    foot_position_w: Float[np.ndarray, "T N 4 3"]
-    """Lowest point of each foot, world frame [m]."""
-    clearance: Float[np.ndarray, "T N 4"]
-    """Height of that point above the ground under it [m]."""
-    foot_height: Float[np.ndarray, "T N 4"]
-    """The condition's h_i: height of each foot at its last touch, in the condition's frame [m]."""
-    k: Float[np.ndarray, "T N"]
-    """The shift condition's counter, before a firing sets it back to 0."""
-    threshold: Float[np.ndarray, "T N"]
-    """β (or the reverse rule's) that k is held against."""
-    gait: Int[np.ndarray, "T N"]
+    sensed: Proprioception
+    """Proprioception and commands."""
+    truth: Privileged
+    """State that only the simulator knows."""
+    k: Float[np.ndarray, "*batch"]
+    """The shift condition's counter, before a shift sets it back to 0 [counts]."""
+    threshold: Float[np.ndarray, "*batch"]
+    """β of the rule that k belongs to, forward or reverse [counts]."""
+    gait: Int[np.ndarray, "*batch"]
     """Index into `gaits` of the gait that acts next."""
-    machine_state: Int[np.ndarray, "T N"]
+    machine_state: Int[np.ndarray, "*batch"]
     """State of that gait's machine."""
-    stance_shown: Bool[np.ndarray, "T N"]
+    stance_shown: Bool[np.ndarray, "*batch"]
     """Whether the contacts are a stance set of that gait's machine."""
-    fallen: Bool[np.ndarray, "T N"]
-    """Whether the robot has fallen by now; it lies where it fell, and counts no more."""
-    command: Float[np.ndarray, "T N 3"]
-    """Commanded forward speed [m/s], yaw rate [rad/s] and stride frequency [Hz]."""
+    fallen: Bool[np.ndarray, "*batch"]
+    """Whether the robot has fallen so far; a fallen robot stays down and no longer counts."""
     gaits: tuple[str, ...]
     """Names of the gaits."""
     robot: str
@@ -58,63 +54,130 @@ class Log:
     terrain: str
     """Spec of the ground."""
     terrain_height: Float[np.ndarray, "rows cols"]
-    """Heights of the ground, rows along +y, columns along +x [m]; the first one's where robots
-    stood on several."""
+    """Heights of the ground, rows along +y, columns along +x [m]; of several grounds, the
+    first."""
     terrain_size: Float[np.ndarray, " 2"]
     """Length along x and width along y of the ground [m]."""
     terrain_origin: Float[np.ndarray, " 2"]
     """World x, y of its first sample [m]."""
-    value: Float[np.ndarray, "T N"] | None = None
-    """What the policy's critic expected from what robots acted on; None where nobody asked."""
 
-    def part(self, entries: slice) -> "Log":
-        """The same robots in some of the entries; arrays are shared."""
-        return replace(self, time=self.time[entries], **self._courses((entries,)))
+    @property
+    def time(self) -> Float[np.ndarray, " T"]:
+        """Since the start of the run [s]."""
+        time: Any = self.sensed.time
+        return np.atleast_1d(time)
 
-    def robots(self, ids: slice) -> "Log":
-        """Some of the robots over the whole time; arrays are shared."""
-        return replace(self, **self._courses((slice(None), ids)))
+    @property
+    def n(self) -> int:
+        """Robots."""
+        return self.k.shape[-1]
 
-    def _courses(self, where: tuple[slice, ...]) -> dict[str, Any]:
-        """All arrays over time and robots, there."""
-        names = (f.name for f in fields(self) if not f.name.startswith((*TIMELESS, "time")))
-        given = ((name, getattr(self, name)) for name in names)
-        return {name: rows[where] for name, rows in given if rows is not None}
+    @property
+    def qpos(self) -> Float[np.ndarray, "*batch 19"]:
+        """MuJoCo's positions: base position [m], base quaternion (w, x, y, z), joints [rad]."""
+        joints = self.sensed.need("joint_position", "a picture")
+        truth = self.truth
+        return np.concatenate([truth.base_position_w, truth.base_quaternion_w, joints], axis=-1)
+
+    @cached_property
+    def touch_height(self) -> Float[np.ndarray, "T N 4"]:
+        """The paper's h: height of each foot above the base at its last touch, along the vertical.
+
+        [m]; NaN where a foot has not touched in this log.
+        """
+        contact = self.sensed.contact
+        entry = np.where(contact, np.arange(len(contact))[:, None, None], 0)
+        last = np.maximum.accumulate(entry, axis=0)
+        height = np.take_along_axis(self.sensed.foot_height, last, axis=0)
+        return np.where(np.logical_or.accumulate(contact, axis=0), height, np.nan)
 
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""
         part = path.with_suffix(".part.npz")
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        given: dict[str, Any] = {k: np.asarray(v) for k, v in values.items() if v is not None}
-        np.savez_compressed(part, **given)
+        values: dict[str, Any] = {"format_version": FORMAT_VERSION}
+        for name in _types():
+            value: Any = self
+            for attribute in name.split("."):
+                value = getattr(value, attribute)
+            if value is not None:
+                values[name] = np.asarray(value)
+        np.savez_compressed(part, **values)
         part.replace(path)
 
     @classmethod
     def load(cls, path: Path) -> "Log":
         """Reads what `save` wrote.
 
-        Other arrays in the file are passed over.
+        Other arrays in the file are ignored.
 
         Raises:
-            GaitshiftError: no such file, not an npz file, or an array is missing or is not what a
-                log has: of another shape, not finite, a time that does not rise at one rate.
+            GaitshiftError: no such file, not an npz file, of an earlier format, or an array is
+                missing or is not what a log has: of another shape, not finite, a time that does not
+                rise at one rate.
         """
-        names = [f.name for f in fields(cls)]
-        try:
-            with path.open("rb") as file:
-                entries = np.load(file)
-                if not isinstance(entries, np.lib.npyio.NpzFile):
-                    raise ValueError("it holds a single array")
-                values: dict[str, Any] = {name: entries[name] for name in names if name in entries}
-        except FileNotFoundError as error:
-            raise GaitshiftError(f"no log file {path}") from error
-        except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
-            raise GaitshiftError(f"{path} is not a complete npz file: {error}") from error
-        missing = [name for name in names if name not in values and name != "value"]
-        if missing:
-            raise GaitshiftError(f"{path} is not a gaitshift log: it lacks '{missing[0]}'")
+        types = _types()
+        values = _read(path, types)
         for name in ("robot", "terrain"):
             values[name] = str(values[name])
         values["gaits"] = tuple(str(name) for name in np.atleast_1d(values["gaits"]))
-        declared = {f.name: f.type for f in fields(cls) if f.name in values}
-        return cls(**checked(path, values, declared))
+        plain = {"sensed.has_heading": bool, "sensed.period": float}
+        for name, kind in plain.items():
+            if np.size(values[name]) != 1:
+                raise GaitshiftError(
+                    f"{path}: '{name}' must be one value, got the shape {np.shape(values[name])}"
+                )
+            values[name] = kind(np.ravel(values[name])[0])
+        values = checked(path, values, {name: types[name] for name in values})
+        records = {name: _record(name, made, values) for name, made in _RECORDS.items()}
+        own = {name: value for name, value in values.items() if "." not in name}
+        return cls(**records, **own)
+
+
+def _types() -> dict[str, Any]:
+    """The types of all entries of a file by name; names of record fields have a prefix."""
+    types: dict[str, Any] = {}
+    for field in fields(Log):
+        made = _RECORDS.get(field.name)
+        if made is None:
+            types[field.name] = field.type
+        else:
+            types |= {f"{field.name}.{inner.name}": inner.type for inner in fields(made)}
+    return types
+
+
+def _record(name: str, made: type[Any], values: Mapping[str, Any]) -> Any:
+    prefix = f"{name}."
+    return made(**{key.removeprefix(prefix): v for key, v in values.items() if prefix in key})
+
+
+def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
+    """The entries of a file that belong to a log."""
+    try:
+        with path.open("rb") as file:
+            entries = np.load(file)
+            if not isinstance(entries, np.lib.npyio.NpzFile):
+                raise ValueError("it holds a single array")
+            version = int(cast(Any, entries).get("format_version", 1))
+            if version == 1 and "qpos" in entries:
+                raise GaitshiftError(
+                    f"{path} is a log of gaitshift 0.1, which later versions do not read; write it "
+                    "anew with the command that made it (demo, record or evaluate --log)"
+                )
+            if version not in (1, FORMAT_VERSION):
+                raise GaitshiftError(
+                    f"{path} is a log of format {version}; this version reads format "
+                    f"{FORMAT_VERSION}"
+                )
+            values: dict[str, Any] = {name: entries[name] for name in types if name in entries}
+    except FileNotFoundError as error:
+        raise GaitshiftError(f"no log file {path}") from error
+    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+        raise GaitshiftError(f"{path} is not a complete npz file: {error}") from error
+    missing = [name for name in types if name not in values and not _is_optional(types[name])]
+    if missing:
+        raise GaitshiftError(f"{path} is not a gaitshift log: it lacks '{missing[0]}'")
+    return values
+
+
+def _is_optional(annotation: Any) -> bool:
+    return type(None) in getattr(annotation, "__args__", ())

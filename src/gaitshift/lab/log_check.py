@@ -1,4 +1,4 @@
-"""What no robot can have left behind: the checks of a log file."""
+"""The checks of a log file: shapes, kinds, finite numbers, times."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,49 +8,48 @@ import numpy as np
 
 from gaitshift.errors import GaitshiftError
 
-TIMELESS = ("gaits", "robot", "terrain")
-"""What the names of fields begin with whose first axis is not time."""
+_MAY_BE_NAN = ("sensed.value", "k", "threshold")
+"""Arrays that may hold NaN; all others hold finite numbers."""
 
-_FINITE = ("time", "qpos", "qvel", "torque", "foot_position_w", "command")
-"""Arrays that hold numbers at all times, and so does the ground; heights of feet that never
-touched, and what conditions make of a robot that lies, may be anything."""
+_FIRST = "sensed.contact"
+"""The array whose shape gives the number of steps and robots."""
 
 LEAST_PERIOD, MOST_PERIOD = 0.0005, 0.5
-"""Between two entries [s]; ours: no robot is controlled faster, and no step is seen slower, so what
-lies outside is no time in seconds."""
+"""Least and greatest time between two entries [s]; ours: no robot is controlled faster, and slower
+entries miss steps, so a value outside is not a time in seconds."""
 
 RATE_TOLERANCE = 0.05
-"""By how much of a period two entries may be nearer or further apart than the first two."""
+"""Largest deviation of the time between two entries from that of the first two [period]."""
 
 _HOLDS = {"b": "true and false", "f": "numbers", "i": "whole numbers"}
-"""What an array of this kind holds, in words."""
+"""Content of an array by its kind, for error messages."""
 
 
 def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) -> dict[str, Any]:
-    """What a log file holds, its arrays as they are declared, if a robot can have left it.
+    """The entries of a log file, checked and with the declared shapes and kinds.
 
     Args:
-        path: of the file, to name.
-        values: what it holds, by name.
-        declared: the types of the same names, as jaxtyping writes them.
+        path: of the file, for error messages.
+        values: its entries by name.
+        declared: the types of the same names, as jaxtyping annotations.
 
     Raises:
         GaitshiftError: an array of another shape or kind, numbers that are not finite, a time that
             does not rise at one rate.
     """
-    whole = {**values, **_shaped(path, values, declared)}
+    whole: dict[str, Any] = {**values, **_shaped(path, values, declared)}
     _check_numbers(path, whole)
-    _check_time(path, whole["time"])
+    _check_time(path, whole["sensed.time"], whole["sensed.period"])
     return whole
 
 
 def _shaped(
     path: Path, values: Mapping[str, Any], types: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
-    """The arrays in the shapes and of the kinds that are declared."""
+    """The arrays with their declared shapes and kinds."""
     declared = {name: _declared(of) for name, of in types.items()}
     sizes, shaped = dict[str, int](), dict[str, np.ndarray]()
-    for name in sorted((n for n, of in declared.items() if of is not None), key="qpos".__ne__):
+    for name in sorted((n for n, of in declared.items() if of is not None), key=_FIRST.__ne__):
         array: np.ndarray = values[name]
         wanted, kind = declared[name] or ((), "")
         known = [int(dim) if dim.isdigit() else sizes.get(dim) for dim in wanted]
@@ -74,29 +73,33 @@ def _shaped(
 
 
 def _declared(annotation: Any) -> tuple[tuple[str, ...], str] | None:
-    """Axes and kind of the arrays that a field takes; None where it takes none."""
+    """Axes and kind of the arrays of a field; None for a field without arrays."""
     of: Any = annotation if hasattr(annotation, "dim_str") else (*get_args(annotation), None)[0]
     if not hasattr(of, "dim_str"):
         return None
     kinds = {np.dtype(name).kind for name in ("bool", "int64", "float64") if name in of.dtypes}
-    return tuple(of.dim_str.split()), kinds.pop()
+    axes = of.dim_str.replace("*batch", "T N").replace("steps", "T")
+    return tuple(axes.split()), kinds.pop()
 
 
 def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
-    """Refuses what no robot can have done."""
-    for name in (*_FINITE, *(n for n in values if n.startswith("terrain_"))):
-        finite = np.isfinite(values[name])
+    """Raises `GaitshiftError` for impossible values."""
+    for name, value in values.items():
+        if name in _MAY_BE_NAN or not isinstance(value, np.ndarray) or value.dtype.kind != "f":
+            continue
+        finite = np.isfinite(np.asarray(value, dtype=float))
         if not finite.all():
             raise GaitshiftError(
                 f"{path}: '{name}' must be finite, got NaN or infinity{_where(~finite, name)}"
             )
-    length = np.linalg.norm(values["qpos"][..., 3:7], axis=-1)
-    wrong = np.abs(length - 1.0) > 0.01
-    if wrong.any():
-        raise GaitshiftError(
-            f"{path}: quaternions in 'qpos' must have length 1, got {length[wrong][0]:.3g}"
-            f"{_where(wrong, 'qpos')}"
-        )
+    for name in ("sensed.orientation", "truth.base_quaternion_w"):
+        length = np.linalg.norm(values[name], axis=-1)
+        wrong = np.abs(length - 1.0) > 0.01
+        if wrong.any():
+            raise GaitshiftError(
+                f"{path}: quaternions of '{name}' must have length 1, got {length[wrong][0]:.3g}"
+                f"{_where(wrong, name)}"
+            )
     gait, names = values["gait"], values["gaits"]
     if gait.min() < 0 or gait.max() >= len(names):
         raise GaitshiftError(
@@ -106,34 +109,40 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
 
 
 def _where(wrong: np.ndarray, name: str) -> str:
-    """The first place where an array is wrong, in words."""
-    if name.startswith(TIMELESS):
+    """The first place where an array is wrong, for error messages."""
+    if name.startswith("terrain_"):
         return ""
     step, *robot = np.argwhere(wrong)[0][:2]
     return f" at entry {step}" + "".join(f" of robot {number}" for number in robot)
 
 
-def _check_time(path: Path, time: np.ndarray) -> None:
-    """Refuses a time that does not rise at one rate."""
+def _check_time(path: Path, time: np.ndarray, stated: float) -> None:
+    """Raises `GaitshiftError` unless the time rises at one rate, by `stated` [s] per entry."""
     apart = np.diff(time)
     if not apart.size:
         return
     standing = np.flatnonzero(apart <= 0.0)
     if standing.size:
         raise GaitshiftError(
-            f"{path}: 'time' must rise from entry to entry, got {time[standing[0] + 1]:.4g} s "
-            f"after {time[standing[0]]:.4g} s at entry {standing[0] + 1}"
+            f"{path}: 'sensed.time' must rise from entry to entry, got "
+            f"{time[standing[0] + 1]:.4g} s after {time[standing[0]]:.4g} s at entry "
+            f"{standing[0] + 1}"
         )
     period = float(apart[0])
     if not LEAST_PERIOD <= period <= MOST_PERIOD:
         raise GaitshiftError(
-            f"{path}: entries of 'time' must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s apart, got "
-            f"{period:.4g}; the unit is seconds"
+            f"{path}: entries of 'sensed.time' must be {LEAST_PERIOD:g} to {MOST_PERIOD:g} s "
+            f"apart, got {period:.4g}; the unit is seconds"
+        )
+    if not abs(stated - period) <= RATE_TOLERANCE * period:
+        raise GaitshiftError(
+            f"{path}: 'sensed.period' must be the time between two entries, {period:.4g} s, got "
+            f"{stated:.4g}"
         )
     changed = np.flatnonzero(np.abs(apart - period) > RATE_TOLERANCE * period)
     if changed.size:
         at = changed[0]
         raise GaitshiftError(
-            f"{path}: entries of 'time' must be equally spaced, got {period:.4g} s at first and "
-            f"{apart[at]:.4g} s at entry {at + 1}"
+            f"{path}: entries of 'sensed.time' must be equally spaced, got {period:.4g} s at first "
+            f"and {apart[at]:.4g} s at entry {at + 1}"
         )

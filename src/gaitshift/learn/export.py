@@ -16,16 +16,16 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.sim.env import GaitEnv
 
 OPSET = 18
-"""ONNX operator set; every onnxruntime of the last years reads it."""
+"""ONNX operator set; every recent onnxruntime reads it."""
 
 
 def describe(env: GaitEnv, training: dict[str, Any]) -> PolicyInfo:
-    """What a policy trained in `env` has to say of itself."""
+    """The description of a policy trained in `env`."""
     gains = env.robot.gains_of(env.config.gains)
     return PolicyInfo(
         robot=env.robot.name,
         machine=env.machine.to_dict(),
-        observation={name: [s.start, s.stop] for name, s in env.observe.slices.items()},
+        observation={name: [s.start, s.stop] for name, s in env.walker.observation.slices.items()},
         action_scale=env.robot.action_scale,
         stance=list(env.robot.stance),
         gains=env.config.gains,
@@ -44,10 +44,10 @@ def export(
     layers: torch.nn.Sequential | None = None,
     critic: MLPModel | None = None,
 ) -> None:
-    """Writes the actor's deterministic part and `info` as one ONNX file, whole or not at all.
+    """Writes the actor's deterministic part and `info` as one ONNX file, atomically.
 
-    `layers` stand in for the actor's own, behind its normalisation of observations. With a critic
-    the file gives `value` beside `action`; its weights are kept in half precision.
+    `layers` replace the actor's own, after its normalisation of observations. With a critic the
+    file has the output `value` beside `action`; the critic's weights are in half precision.
     """
     modules = list(actor.mlp if layers is None else layers)
     write(modules, info, path, normalizer=_normalizer(actor), critic=critic)
@@ -61,10 +61,10 @@ def write(
     normalizer: EmpiricalNormalization | None = None,
     critic: MLPModel | None = None,
 ) -> None:
-    """Writes a network of these layers, behind `normalizer`, and `info` as one ONNX file.
+    """Writes a network of these layers, after `normalizer`, and `info` as one ONNX file.
 
-    The graph is written out layer by layer (linear, leaky ReLU, tanh): a policy is no more than
-    that, and the file then depends on no tracer's version.
+    The graph is written layer by layer (linear, leaky ReLU, tanh), so that the file does not depend
+    on the version of a tracer.
     """
     inputs = next(layer.in_features for layer in layers if isinstance(layer, torch.nn.Linear))
     parts = _Graph()

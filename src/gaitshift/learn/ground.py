@@ -4,33 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from gaitshift.learn.recipe import Recipe, Stage
+from gaitshift.learn.recipe import Stage
 from gaitshift.sim.terrain import Terrain, flat, perlin, slope, stairs
 
 FIELD = 20.0
 """Side of a training field [m]; ours: an episode of 10 s rarely leaves it."""
 
 FIRST_SHARE = 0.3
-"""Share of a stage's measures that its first fields reach; it grows to 1 by the middle."""
+"""Share of a stage's largest heights and slopes at its start; it grows to 1 by the middle."""
 
 RUNS = {"stair": (0.30, 0.50), "step": (1.0, 2.5)}
 """Shortest and longest tread [m]; ours: those of staircases, and room for strides in between."""
 
 
-def stage_at(recipe: Recipe, iteration: int) -> tuple[Stage, int]:
-    """The stage of an iteration and the iteration's number within it."""
-    for stage in recipe.stages:
-        if iteration < stage.iterations:
-            return stage, iteration
-        iteration -= stage.iterations
-    return recipe.stages[-1], recipe.stages[-1].iterations + iteration
-
-
 def draw_grounds(stage: Stage, within: int, seed: int) -> tuple[Terrain, ...]:
-    """The fields of a stage at its iteration `within`; the same for the same numbers.
+    """The fields of a stage at its iteration `within`; the same for the same arguments.
 
-    Amplitudes and angles are drawn from 0 to the largest of the moment, so that gentle ground is
-    never forgotten.
+    Amplitudes and angles are drawn between 0 and the present maximum, so that the policy does not
+    forget gentle ground.
     """
     if not stage.is_rough:
         return (flat(FIELD, FIELD),)
@@ -52,6 +43,6 @@ def _draw(kind: str, stage: Stage, grown: float, rng: np.random.Generator) -> Te
 
 
 def _stairs(rise: float, run: float) -> Terrain:
-    """Stairs with faces as steep as those of trials; across them a sample every 10 cm is enough."""
+    """Stairs with faces as steep as in the trials; across them one sample per 10 cm is enough."""
     strip = stairs(rise, run=run, flight=1000, length=FIELD, width=FIELD / 4)
     return replace(strip, size=(FIELD, FIELD), origin=(0.0, -FIELD / 2))

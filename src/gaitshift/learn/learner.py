@@ -1,4 +1,4 @@
-"""rsl_rl's PPO on a `GaitEnv`: one object that collects and learns an iteration at a time."""
+"""rsl_rl's PPO on a `GaitEnv`: one object that collects data and learns, one iteration a call."""
 
 from itertools import chain
 from math import isfinite
@@ -22,12 +22,12 @@ _GROUPS = {"actor": ["policy"], "critic": ["policy"]}
 
 
 def as_tensors(observation: np.ndarray) -> TensorDict:
-    """An observation as rsl_rl wants it."""
+    """An observation in rsl_rl's form."""
     return TensorDict({"policy": torch.from_numpy(observation)}, batch_size=[len(observation)])
 
 
 class DivergedError(GaitshiftError):
-    """A training broke down in its own numbers: they are no longer finite."""
+    """A training diverged: its weights, actions or figures are not finite."""
 
 
 class Learner:
@@ -41,13 +41,13 @@ class Learner:
         self.totals: dict[str, float] = {}
 
     def start_episodes(self, seed: int) -> None:
-        """Starts all robots anew from a seed, with the ages of their episodes spread out."""
+        """Restarts all robots from a seed, with episodes of different ages."""
         observation, _ = self.env.reset(seed=seed)
         self.env.spread_ages()
         self._observation = as_tensors(observation)
 
     def iterate(self) -> dict[str, float]:
-        """Collects one batch, learns from it, and tells what it saw.
+        """Collects one batch, learns from it, and returns the means of the batch.
 
         Raises:
             DivergedError: weights, actions or figures are not finite.
@@ -55,7 +55,7 @@ class Learner:
         try:
             seen = self._collect_and_update()
         except (ArithmeticError, RuntimeError, ValueError):
-            self._check_weights()  # torch's own complaint about them is not as plain
+            self._check_weights()  # torch's own error is less clear
             raise
         self._check_weights()
         for name, value in seen.items():
@@ -81,7 +81,7 @@ class Learner:
     def aim(
         self, *, desired_kl: float, entropy: float, horizon: float = 1.0, trace: float = 1.0
     ) -> None:
-        """Sets factors on what updates aim at, the entropy bonus, 1 / (1 - γ) and 1 / (1 - λ)."""
+        """Sets factors on the desired KL, the entropy bonus, 1 / (1 - γ) and 1 / (1 - λ)."""
         config = self.recipe.ppo
         self.ppo.desired_kl = desired_kl * config.desired_kl
         self.ppo.entropy_coef = entropy * config.entropy
@@ -103,7 +103,7 @@ class Learner:
         statistics.add(reward, terminated, truncated, info)
         rewards = torch.from_numpy(scale * reward).float()
         if truncated.any():
-            # A cut episode goes on in truth: its last step is worth what its true end was worth.
+            # A truncated episode has no end: its last reward gets the value of the final state.
             final = as_tensors(info["final_obs"][truncated])
             rewards[torch.from_numpy(truncated)] += ppo.gamma * ppo.critic(final).squeeze(1)
         self._observation = as_tensors(observation)
@@ -112,7 +112,7 @@ class Learner:
 
 
 class _Statistics:
-    """Means over an iteration of what the environment says each step."""
+    """Means over an iteration of the environment's outputs at each step."""
 
     def __init__(self) -> None:
         self._sums: dict[str, float] = {}
@@ -142,7 +142,7 @@ class _Statistics:
     def means(self) -> dict[str, float]:
         """Mean of each quantity.
 
-        `survival` is the chance to last 10 s at the present rate of falls.
+        `survival` is the probability of no fall in 10 s at the present rate of falls.
         """
         means = {name: total / self._steps for name, total in self._sums.items()}
         means["survival"] = float((1.0 - means.pop("falls")) ** 1000)
@@ -162,7 +162,7 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         "std_range": (0.05, 2.0),
     }
     actor = MLPModel(observation, _GROUPS, "actor", 12, **network, distribution_cfg=distribution)
-    with torch.no_grad():  # the first actions are then nearly the stance
+    with torch.no_grad():  # so the first actions are close to the stance
         cast(torch.nn.Linear, actor.mlp[-1]).weight.mul_(config.output_gain)
     critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
@@ -191,7 +191,7 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
 
 def _symmetry(env: GaitEnv) -> dict[str, Any]:
     """rsl_rl's augmentation: each batch followed by its mirror image."""
-    order, signs = (torch.from_numpy(part) for part in env.observe.mirror)
+    order, signs = (torch.from_numpy(part) for part in env.walker.observation.mirror)
     joint_order = torch.tensor(JOINT_MIRROR[0])
     joint_signs = torch.tensor(JOINT_MIRROR[1], dtype=torch.float32)
 

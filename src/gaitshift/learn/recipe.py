@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.sim.env import EnvConfig
+from gaitshift.sim.env import Curriculum, EnvConfig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,34 +75,33 @@ class Stage:
     push: float = 0.0
     """Largest push on the base [N]."""
     mixed_starts: float = 0.0
-    """Share of the episodes that begin in the midst of a stride that is no gait's, as after a shift
-    from another gait (`GaitEnv.mixed_starts`); ours, the paper trains nothing for shifts."""
+    """Share of the episodes that start mid-stride with the legs out of phase, as after a shift from
+    another gait (`Curriculum.mixed_starts`); ours, the paper does not train for shifts."""
     swing_factor: float = 1.0
-    """Factor on the swing heights that the gait asks for; ours: feet that swing 14 cm high, where
-    10 cm is enough on level ground, do not catch on steps."""
+    """Factor on the gait's swing heights; ours: feet that swing 14 cm high do not catch on steps;
+    on level ground 10 cm is enough."""
     kl_factor: float = 1.0
-    """Factor on PPO's `desired_kl`; ours: on rough ground larger steps come further."""
+    """Factor on PPO's `desired_kl`; ours: on rough ground larger updates learn more."""
     horizon_factor: float = 1.0
-    """Factor on PPO's horizon, 1 / (1 - γ) steps; ours: a foot that is caught on an edge brings the
-    robot down 1 to 3 s later, which a horizon of 1 s hardly sees."""
+    """Factor on PPO's horizon, 1 / (1 - γ) steps; ours: a robot falls 1 to 3 s after a foot catches
+    on an edge, and a horizon of 1 s is too short to learn from that."""
     trace_factor: float = 1.0
-    """Factor on 1 / (1 - λ) steps, how far back PPO lays what happens to an action's account;
-    ours: with λ = 0.98 robots keep their feet on edges that fell with 0.95, but their steps are
-    less clean, which a last stage with 0.95 mends."""
+    """Factor on 1 / (1 - λ) steps, the time over which PPO assigns credit to an action; ours: with
+    λ = 0.98 robots stay up on edges on which they fall with 0.95, but their steps are less clean;
+    a last stage with 0.95 makes the steps clean again."""
     fields: tuple[str, ...] = _shared_out(flat=3, perlin=2, slope=1, stair=3, step=3)
-    """Kinds of the fields that robots share out at a time on rough ground; ours: level ground
-    stays among them, or speeds and touchdowns that were learned on it get lost. With one field of
-    stairs and one of steps in nine, 8 of 64 bounding robots stayed up over steps of 10 cm; with
-    these, 64."""
+    """Kinds of the fields among which the robots are divided on rough ground; ours: without level
+    ground among them the policy forgets the speeds and touchdowns that it learned there. With one
+    field of stairs and one of steps in nine, 8 of 64 bounding robots stayed up over steps of 10 cm;
+    with these, all 64 did."""
     settle: float = 0.35
     """Last share of the stage, if the run ends with it, in which the policy settles: `desired_kl`
-    and `entropy` fall to a tenth; ours: without it the speed of the last policy is off by up to
-    0.2 m/s, now to this side, now to that."""
+    and `entropy` fall to a tenth; ours: without it the speed of the last policy is up to 0.2 m/s
+    too high or too low."""
     averaged: float = 0.24
     """Last share of the stage, if the run ends with it, whose checkpoints' actors are averaged into
-    the policy; ours: what a policy does on edges and how fast it walks goes up and down from one to
-    the next, and their mean is better than most of them (Izmailov et al. 2018). 0: the last actor
-    alone."""
+    the policy; ours: speed and success on edges vary from one checkpoint to the next, and the
+    average is better than most of them (Izmailov et al. 2018). 0: the last actor alone."""
 
     def __post_init__(self) -> None:
         for name in ("settle", "averaged"):
@@ -159,24 +158,24 @@ class Recipe:
             averaged=0.5,
         ),
     )
-    """Flat ground, then Perlin ground with pushes (paper III-D), in two stages: sturdy, then clean
-    again."""
+    """Flat ground, then Perlin ground with pushes (paper III-D) in two stages: the first makes the
+    policy robust, the second makes the gait clean again."""
     robots: int = 128
     """Robots in parallel; ours: a core's worth of physics a step (the paper has 30)."""
     steps: int = 24
     """Control steps of each robot in an iteration; ours (the paper has 100)."""
     strict_from: int = 60
-    """Iteration from which the environment's strictness grows from 0; ours: asked for in full from
-    the start, swing heights and the price of chatter hide the cycle from exploration."""
+    """Iteration from which the environment's strictness grows from 0; ours: at full strictness from
+    the start, swing heights and the chatter penalty keep exploration from finding the cycle."""
     strict_until: int = 210
-    """Iteration at which it has grown."""
+    """Iteration at which it stops growing."""
     strict_share: float = 1.0
-    """Strictness then; 0: none ever, as in the paper."""
+    """Strictness from then on; 0: none at any time, as in the paper."""
     command_from: int = 100
-    """Iteration from which commands spread from the gait's own; ours: first the gait, then its
-    speeds and frequencies."""
+    """Iteration from which commands differ from the gait's own; ours: the policy learns the gait
+    first, then its speeds and frequencies."""
     command_until: int = 300
-    """Iteration at which commands are drawn from all of the gait's ranges."""
+    """Iteration from which commands are drawn from the gait's whole ranges."""
     penalty_start: float = 1.0
     """The factor λ on all penalties at the first iteration; 1: no curriculum (paper III-D)."""
     penalty_until: int = 200
@@ -216,7 +215,7 @@ class Recipe:
         return sum(stage.iterations for stage in self.stages)
 
     def with_iterations(self, iterations: int) -> "Recipe":
-        """The same recipe cut, or its last stage drawn out, to this number of iterations."""
+        """The same recipe with this number of iterations: cut, or with a longer last stage."""
         if iterations < 1:
             raise GaitshiftError(f"iterations must be 1 or more, got {iterations}")
         stages: list[Stage] = []
@@ -227,18 +226,26 @@ class Recipe:
             left -= take
         return replace(self, stages=tuple(s for s in stages if s.iterations > 0))
 
-    def strictness(self, iteration: int) -> float:
-        """The environment's strictness at this iteration."""
-        return self.strict_share * _grown(iteration, self.strict_from, self.strict_until)
+    def stage_at(self, iteration: int) -> tuple[Stage, int]:
+        """The stage of an iteration and the iteration's number within it."""
+        for stage in self.stages:
+            if iteration < stage.iterations:
+                return stage, iteration
+            iteration -= stage.iterations
+        return self.stages[-1], self.stages[-1].iterations + iteration
 
-    def command_scale(self, iteration: int) -> float:
-        """Share of the gait's ranges that commands are drawn from at this iteration."""
-        return _grown(iteration, self.command_from, self.command_until)
-
-    def penalty_scale(self, iteration: int) -> float:
-        """The factor λ on all penalties at this iteration (paper III-D)."""
+    def curriculum(self, iteration: int) -> Curriculum:
+        """The curriculum at this iteration."""
+        stage, _ = self.stage_at(iteration)
+        strictness = _grown(iteration, self.strict_from, self.strict_until)
         first = self.penalty_start
-        return first + (1.0 - first) * _grown(iteration, 0, self.penalty_until)
+        return Curriculum(
+            strictness=self.strict_share * strictness,
+            swing_factor=stage.swing_factor,
+            command_scale=_grown(iteration, self.command_from, self.command_until),
+            penalty_scale=first + (1.0 - first) * _grown(iteration, 0, self.penalty_until),
+            mixed_starts=stage.mixed_starts,
+        )
 
     def settling(self, iteration: int) -> float:
         """The factor on `desired_kl` and `entropy` at this iteration."""
@@ -254,15 +261,26 @@ class Recipe:
         return last.averaged > 0 and iteration >= self.iterations - last.averaged * last.iterations
 
     @classmethod
+    def two_stage(cls) -> "Recipe":
+        """The recipe without the last stage, by which six of the shipped policies are trained.
+
+        The last 35 % of all iterations settle, and actors are averaged over the last 24 %.
+        """
+        rough, total = replace(_ROUGH, trace_factor=1.0), 350 + _ROUGH.iterations
+        settle, averaged = (share * total / _ROUGH.iterations for share in (0.35, 0.24))
+        last = replace(rough, settle=settle, averaged=averaged)
+        return cls(stages=(Stage(name="flat", iterations=350), last))
+
+    @classmethod
     def paper(cls) -> "Recipe":
         """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
 
         PPO has these defaults of stable-baselines3, the library that the paper names: 10 epochs,
         mini-batches of 64 (63 here, as 47 parts of 3000), learning rate 3e-4 without adaptation,
-        γ, λ, clipping, no entropy bonus, no normalisation of observations. rsl_rl's own stand in
-        the weight of the value loss (1, there 0.5), the largest norm of gradients (1 for each
-        network, there 0.5 for both), the normalisation of advantages (over the batch, there over
-        each mini-batch) and Adam's ε (1e-8, there 1e-5).
+        γ, λ, clipping, no entropy bonus, no normalisation of observations. Four settings stay those
+        of rsl_rl: the weight of the value loss (1; stable-baselines3: 0.5), the largest norm of
+        gradients (1 for each network; 0.5 for both), the normalisation of advantages (over the
+        batch; over each mini-batch) and Adam's ε (1e-8; 1e-5).
         """
         return cls(
             env=EnvConfig.paper(),
@@ -290,5 +308,5 @@ def _grown(iteration: int, start: float, end: float) -> float:
     return min(max((iteration - start) / (end - start), 0.0), 1.0)
 
 
-PRESETS = {"default": Recipe, "paper": Recipe.paper}
+PRESETS = {"default": Recipe, "two-stage": Recipe.two_stage, "paper": Recipe.paper}
 """Recipes by the name that `gaitshift train --preset` takes."""

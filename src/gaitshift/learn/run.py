@@ -1,4 +1,4 @@
-"""A training run: its folder, its loop, and how it goes on after it was killed."""
+"""A training run: its folder, its loop, and how it resumes after a kill."""
 
 import json
 import platform
@@ -16,17 +16,19 @@ import numpy as np
 import torch
 from torch.utils.tensorboard import SummaryWriter
 
+from gaitshift import table
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
-from gaitshift.learn.ground import FIELD, draw_grounds, stage_at
+from gaitshift.learn.ground import FIELD, draw_grounds
 from gaitshift.learn.learner import Learner
-from gaitshift.learn.lines import Row, append, last, trim
+from gaitshift.learn.progress import last, trim
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.robot_file import from_dict, to_dict, use_robot
+from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.table import Row
 
 CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
 PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
@@ -34,15 +36,15 @@ PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
 Judge = Callable[[Path], Row]
-"""Looks at a policy file and gives its verdict, a line of `verdicts.csv`."""
+"""Evaluates a policy file and returns its verdict, a row of `verdicts.csv`."""
 
 
 class Run:
     """One gait, one recipe, one seed, one folder.
 
-    A checkpoint is taken every `recipe.checkpoint_every` iterations. At each of them, in a run that
-    was never broken as in one that goes on from there, all robots start anew from a seed made of
-    the run's seed and the iteration: so both give the same weights, bit for bit.
+    A checkpoint is taken every `recipe.checkpoint_every` iterations. At each checkpoint all robots
+    restart from a seed made of the run's seed and the iteration. So a resumed run gives the same
+    weights as an uninterrupted one, bit for bit.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class Run:
     ) -> None:
         self.folder = folder
         self.machine = machine
+        self.robot = robot
         self.recipe = recipe
         self.seed = seed
         self.command = command
@@ -93,7 +96,7 @@ class Run:
                     f"or --resume {folder}"
                 )
             _clear(folder)
-        folder.mkdir(parents=True, exist_ok=True)  # first, since where it fails nothing else helps
+        folder.mkdir(parents=True, exist_ok=True)  # first: without a folder nothing else can work
         run = cls(folder, machine, recipe, seed, command, robot)
         config = {
             "command": command,
@@ -104,7 +107,7 @@ class Run:
         }
         if robot != ANYMAL_B:
             config["robot"] = to_dict(robot)
-        # First of all, so that a folder left half made by a kill still shows what it is.
+        # First, so that a folder that a kill left unfinished still shows what it is.
         (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
         (folder / CHECKPOINTS).mkdir(exist_ok=True)
         run._save_checkpoint()
@@ -118,7 +121,6 @@ class Run:
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
             robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
-            use_robot(robot)
             run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
         except (FileNotFoundError, NotADirectoryError) as error:
             raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
@@ -140,9 +142,9 @@ class Run:
     ) -> Path:
         """Runs to the end, calling `report` after each iteration; gives the policy's path.
 
-        At each checkpoint the policy is written out for `judge`, and its verdict written down;
-        first of all that of the present one, if a kill left it out.
-        Interrupted by Ctrl-C it leaves the last checkpoint, and the policy as it stands.
+        At each checkpoint the policy is written for `judge`, and its verdict is saved. If a kill
+        prevented the verdict of the present checkpoint, that one is made first.
+        After Ctrl-C the last checkpoint and the present policy are on disk.
         """
         writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
         for name in (PROGRESS, VERDICTS):
@@ -164,10 +166,10 @@ class Run:
         return self.folder / POLICY
 
     def write_policy_at(self, iteration: int, path: Path) -> None:
-        """Writes the policy as it stood at a checkpoint; the run itself stands there then.
+        """Writes the policy of a checkpoint; the run itself goes back to that checkpoint.
 
         Raises:
-            GaitshiftError: no such checkpoint, or a damaged one.
+            GaitshiftError: the checkpoint is missing or damaged.
         """
         self._load_checkpoint(self.folder / CHECKPOINTS / f"{iteration:06d}.pt")
         self.export(path)
@@ -201,17 +203,14 @@ class Run:
         return layers
 
     def iterate(self) -> Row:
-        """One iteration, on the ground of its stage; gives the line that `train` writes down."""
+        """One iteration, on the ground of its stage; returns the row that `train` writes."""
         start = time.perf_counter()
-        stage, within = stage_at(self.recipe, self.iteration)
+        stage, within = self.recipe.stage_at(self.iteration)
         env = self.learner.env
         if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
             env.set_terrain(draw_grounds(stage, within, self.seed))
             env.push_at_most(stage.push)
-        env.swing_factor, env.mixed_starts = stage.swing_factor, stage.mixed_starts
-        env.strictness = self.recipe.strictness(self.iteration)
-        env.command_scale = self.recipe.command_scale(self.iteration)
-        env.penalty_scale = self.recipe.penalty_scale(self.iteration)
+        env.curriculum = self.recipe.curriculum(self.iteration)
         settling = self.recipe.settling(self.iteration)
         self.learner.aim(
             desired_kl=stage.kl_factor * settling,
@@ -261,13 +260,13 @@ class Run:
             why = " ".join(str(error).split())
             raise GaitshiftError(f"{path} does not fit {self.folder / CONFIG}: {why}") from error
         torch.set_rng_state(state["torch_rng"])
-        stage, within = stage_at(self.recipe, self.iteration)
+        stage, within = self.recipe.stage_at(self.iteration)
         drawn = within - within % stage.redraw_every
         self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed))
         self.learner.env.push_at_most(stage.push)
 
     def _log(self, row: Row, writer: SummaryWriter) -> None:
-        append(self.folder / PROGRESS, row)
+        table.append(self.folder / PROGRESS, row)
         for name, value in row.items():
             if name not in ("iteration", "stage"):
                 writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
@@ -280,7 +279,7 @@ class Run:
     def _write_verdict(self, judge: Judge) -> None:
         self.export()
         verdict = judge(self.folder / POLICY)
-        append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
+        table.append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
 
 
 def _read_checkpoint(path: Path) -> dict[str, Any]:
@@ -302,7 +301,7 @@ def _versions() -> dict[str, str]:
 
 
 def _clear(folder: Path) -> None:
-    """Empties the folder of an earlier run; anything else in it is not ours to delete."""
+    """Deletes the folder of an earlier run; `GaitshiftError` where the folder holds no run."""
     if not (folder / CONFIG).is_file():
         raise GaitshiftError(f"{folder} is not a training run and is not overwritten")
     shutil.rmtree(folder)

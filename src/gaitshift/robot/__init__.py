@@ -8,4 +8,5 @@ from gaitshift.robot.description import Gains as Gains
 from gaitshift.robot.description import Robot as Robot
 from gaitshift.robot.legs import JOINTS as JOINTS
 from gaitshift.robot.legs import LEGS as LEGS
-from gaitshift.robot.motion import Motion as Motion
+from gaitshift.robot.state import Privileged as Privileged
+from gaitshift.robot.state import Proprioception as Proprioception

@@ -42,6 +42,8 @@ class Robot:
     """Joint angles of the default stance, the paper's q_init (12 values) [rad]."""
     stance_height: float
     """Height of the base origin above level ground in that stance, feet just touching [m]."""
+    mass: float
+    """Of all its bodies [kg]."""
     foot_radius: float
     """[m]"""
     effort_limit: float
@@ -61,6 +63,14 @@ class Robot:
         if "default" not in self.gains:
             raise GaitshiftError(
                 f"robot {self.name}: gains must have a preset 'default', got {list(self.gains)}"
+            )
+
+    def check_is(self, name: str, what: str) -> None:
+        """`GaitshiftError` unless `what`, which is of the robot of this name, is of this one."""
+        if name != self.name:
+            given = "no" if name == ANYMAL_B.name else "its file as"
+            raise GaitshiftError(
+                f"{what} is of the robot '{name}', not of '{self.name}'; give {given} --robot-file"
             )
 
     @property
@@ -107,6 +117,7 @@ ANYMAL_B = Robot(
         *(-_HAA, -_HFE, _KFE),
     ),
     stance_height=0.4927,
+    mass=30.475396462000006,
     foot_radius=0.031,
     effort_limit=80.0,
     velocity_limit=15.0,
@@ -117,6 +128,3 @@ ANYMAL_B = Robot(
         "paper": Gains(kp=3.0, kd=0.2),
     },
 )
-
-ROBOTS = {ANYMAL_B.name: ANYMAL_B}
-"""The robots that policies may name."""

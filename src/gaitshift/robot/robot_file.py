@@ -10,7 +10,7 @@ import numpy as np
 from gaitshift.data import Table, located, tables_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ANYMAL_B, ROBOTS, Gains, Robot
+from gaitshift.robot.description import ANYMAL_B, Gains, Robot
 from gaitshift.robot.legs import JOINTS, LEGS
 
 _NUMBERS = ("foot_radius", "effort_limit", "velocity_limit", "action_scale")
@@ -51,35 +51,13 @@ def read_robot(path: Path) -> Robot:
             name=name,
             model_file=model_file.resolve(),
             stance=stance,
-            stance_height=np.inf,  # until the model is asked
+            stance_height=np.inf,  # until the model is asked, as for the mass
+            mass=np.inf,
             gains=gains,
             **numbers,
         )
         with located(str(model_file)):
-            return _with_height(robot, _checked_model(robot))
-
-
-def use_robot_file(path: Path | None) -> Robot:
-    """The robot in a file, known from here on; without a file ANYmal B."""
-    if path is None:
-        return ANYMAL_B
-    robot = read_robot(path)
-    use_robot(robot)
-    return robot
-
-
-def use_robot(robot: Robot) -> None:
-    """Makes policies and logs of this robot known to this process.
-
-    Raises:
-        GaitshiftError: another robot of its name is known.
-    """
-    known = ROBOTS.get(robot.name)
-    if known is not None and known != robot:
-        raise GaitshiftError(
-            f"robot names must differ, got '{robot.name}' for two robots; rename one"
-        )
-    ROBOTS[robot.name] = robot
+            return _measured(robot, _checked_model(robot))
 
 
 def to_dict(robot: Robot) -> dict[str, Any]:
@@ -167,8 +145,8 @@ def _has_site(model: mujoco.MjModel, name: str) -> bool:
     return mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name) >= 0
 
 
-def _with_height(robot: Robot, model: mujoco.MjModel) -> Robot:
-    """The robot with the height of its base in the stance, its lowest foot just touching."""
+def _measured(robot: Robot, model: mujoco.MjModel) -> Robot:
+    """The robot with its mass and its height in the stance, the lowest foot just touching."""
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0, *robot.stance]
     mujoco.mj_kinematics(model, data)
@@ -178,4 +156,5 @@ def _with_height(robot: Robot, model: mujoco.MjModel) -> Robot:
             f"stance must put the feet at one height, got heights {100 * apart:.0f} cm apart; "
             f"angles are in the order {', '.join(LEGS)} × {', '.join(JOINTS)}"
         )
-    return replace(robot, stance_height=robot.foot_radius - min(feet))
+    mass = float(model.body_mass.sum())
+    return replace(robot, mass=mass, stance_height=robot.foot_radius - min(feet))

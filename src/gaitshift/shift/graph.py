@@ -1,20 +1,21 @@
-"""The gait graph: gaits, and the conditions on the ways between them, as data."""
+"""The gait graph: gaits and the conditions on the ways between them. It alone counts k."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
-from pathlib import Path
+from typing import Any
 
-from gaitshift.data import Table, known_names, located, tables_in
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
-from gaitshift.shift.condition import Condition
+from gaitshift.robot.state import Proprioception
 from gaitshift.shift.modulation import Modulation
-from gaitshift.shift.named import statistic
 from gaitshift.shift.rule import Rule
-from gaitshift.shift.statistic import AnyStatistic
-
-_FOLDER = Path(__file__).parent / "graphs"
-_RULE = ("when", "alpha", "beta", "epsilon", "leak", "hold")
+from gaitshift.shift.statistic import begun_anew
+from gaitshift.shift.statistics import Watched, watch
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +41,39 @@ class Edge:
         return f"{self.source} -> {self.target}"
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GraphState:
+    """What a graph remembers of N robots between two steps."""
+
+    gait: Int[np.ndarray, " N"]
+    """Index into the graph's `gaits` of the gait that each robot is in; -1: none of them."""
+    k: Float[np.ndarray, "N E"]
+    """The paper's counter of each edge [counts]."""
+    time_in_gait: Float[np.ndarray, " N"]
+    """Since the last shift [s]."""
+    memory: Mapping[str, Any]
+    """What each statistic remembers, by its name in the graph."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Decision:
+    """What a graph decided for N robots in one step."""
+
+    fired: Bool[np.ndarray, " N"]
+    """Which robots change their gait now; `GraphState.gait` has the new one."""
+    k: Float[np.ndarray, " N"]
+    """The counter of the edge that is nearest to firing, before a shift sets it back [counts]."""
+    threshold: Float[np.ndarray, " N"]
+    """The β that it is held against; 0 where nothing counts."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class GaitGraph:
     """Gaits as nodes, conditions on the edges between them; checked when it is made.
+
+    The paper's Algorithm 1 (III-E) is an edge, its reverse (IV-C) the edge back. Any controller can
+    carry a graph, learned or model-based (III-F). α may change between steps (III-E): go on with
+    the same state and a replaced graph, or give an edge a `modulation`.
 
     Raises:
         GaitshiftError: no edges; an edge to its own gait; a gait that cannot be reached; two edges
@@ -51,7 +82,7 @@ class GaitGraph:
 
     start: str
     """The gait at the beginning."""
-    statistics: Mapping[str, AnyStatistic]
+    statistics: Mapping[str, Watched]
     """What is watched, by name."""
     edges: tuple[Edge, ...]
     """The ways."""
@@ -90,60 +121,87 @@ class GaitGraph:
                 f"no edges lead from the start gait '{self.start}' to the gait '{lost[0]}'"
             )
 
-    @property
+    @cached_property
     def gaits(self) -> tuple[str, ...]:
         """The gaits, each once, the first one first."""
         ends = (gait for edge in self.edges for gait in (edge.source, edge.target))
         return tuple(dict.fromkeys((self.start, *ends)))
 
-    @classmethod
-    def of(cls, condition: Condition, *, flat: str, rough: str) -> "GaitGraph":
-        """The paper's two gaits: one condition, the way there and the way back."""
-        if flat == rough:
-            raise GaitshiftError(
-                f"the gaits for flat and rough ground must differ, got '{flat}' for both"
-            )
-        watched: dict[str, AnyStatistic] = {"ground": condition.statistic}
-        back = "ground"
-        if condition.statistic_back is not None:
-            back = "level ground"
-            watched[back] = condition.statistic_back
-        ends = (
-            (flat, rough, "ground", condition.rough),
-            (rough, flat, back, condition.flat),
-        )
-        return cls(
-            start=flat,
-            statistics=watched,
-            edges=tuple(
-                Edge(
-                    source=source,
-                    target=target,
-                    statistic=name,
-                    rule=rule,
-                    modulation=condition.modulation,
-                )
-                for source, target, name, rule in ends
-            ),
-            reset=condition.reset,
+    @property
+    def needs(self) -> frozenset[str]:
+        """Optional fields of `Proprioception` that its statistics read."""
+        return frozenset(name for one in self.statistics.values() for name in one.needs)
+
+    def begin(self, n: int) -> GraphState:
+        """State of n robots in the first gait, of which nothing has been seen."""
+        return GraphState(
+            gait=np.zeros(n, dtype=np.int64),
+            k=np.zeros((n, len(self.edges))),
+            time_in_gait=np.zeros(n),
+            memory={name: one.start(n) for name, one in self.statistics.items()},
         )
 
-    @classmethod
-    def load(cls, name_or_path: str | Path) -> "GaitGraph":
-        """A shipped graph by its name, or that of a TOML file by its path.
+    def step(
+        self,
+        state: GraphState,
+        sensed: Proprioception,
+        rough: Bool[np.ndarray, " N"] | None = None,
+    ) -> tuple[GraphState, Decision]:
+        """Takes in one control step of N robots: the state after it, and who shifts now.
 
-        Raises:
-            GaitshiftError: no such graph, or a fault in the file, which is named with its place.
+        Each edge that leaves a robot's gait counts on its own; the first to fire is taken. `rough`
+        is the truth about the ground, for an oracle. Nothing given is written to.
         """
-        path = Path(name_or_path)
-        if path.suffix != ".toml":
-            known = tuple(sorted(file.stem for file in _FOLDER.glob("*.toml")))
-            if str(name_or_path) not in known:
-                hint = "or give the path of a .toml file"
-                raise GaitshiftError(f"{known_names('graph', str(name_or_path), known)}; {hint}")
-            path = _FOLDER / f"{name_or_path}.toml"
-        with located(str(path)):
-            return _read(tables_in(path))
+        memory, values = dict[str, Any](), dict[str, np.ndarray]()
+        for name, one in self.statistics.items():
+            memory[name], values[name] = watch(one, state.memory[name], sensed, rough)
+        time = state.time_in_gait + sensed.period
+        k, fires, decision = self._count(state, sensed, values, time)
+        if not decision.fired.any():
+            return replace(state, k=k, time_in_gait=time, memory=memory), decision
+        gait = state.gait.copy()
+        free = np.ones(len(gait), dtype=bool)
+        for index in self._by_priority:
+            takes = free & fires[:, index]
+            gait[takes] = self.gaits.index(self.edges[index].target)
+            free &= ~takes
+            # the edges of the new gait start anew or, as there is one k in the paper, go on from it
+            k[takes] = 0.0 if self.reset else k[takes, index, None]
+        if self.reset:
+            for name, one in self.statistics.items():
+                memory[name] = begun_anew(one, memory[name], decision.fired)
+        time = np.where(decision.fired, 0.0, time)
+        return GraphState(gait=gait, k=k, time_in_gait=time, memory=memory), decision
+
+    def _count(
+        self,
+        state: GraphState,
+        sensed: Proprioception,
+        values: Mapping[str, np.ndarray],
+        time: Float[np.ndarray, " N"],
+    ) -> tuple[Float[np.ndarray, "N E"], Bool[np.ndarray, "N E"], Decision]:
+        """The counters of the edges that leave each robot's gait moved on, and which fire."""
+        n, after = len(state.gait), state.k.copy()
+        k, threshold, nearest = np.zeros(n), np.zeros(n), np.full(n, -np.inf)
+        fires = np.zeros(after.shape, dtype=bool)
+        for index, edge in enumerate(self.edges):
+            here = state.gait == self.gaits.index(edge.source)
+            if not here.any():
+                continue
+            factor = 1.0 if edge.modulation is None else edge.modulation.factor(sensed)
+            counted = edge.rule.step(after[:, index], values[edge.statistic], factor)
+            after[here, index] = counted[here]
+            fires[:, index] = here & edge.rule.fires(counted, time)
+            near = counted / (edge.rule.beta + 1.0)
+            closer = here & (near > nearest)
+            nearest[closer] = near[closer]
+            k[closer], threshold[closer] = counted[closer], edge.rule.beta
+        return after, fires, Decision(fired=np.asarray(fires.any(axis=1)), k=k, threshold=threshold)
+
+    @cached_property
+    def _by_priority(self) -> tuple[int, ...]:
+        """Numbers of the edges, those of high priority first."""
+        return tuple(sorted(range(len(self.edges)), key=lambda i: -self.edges[i].priority))
 
     def mermaid(self) -> str:
         """As a Mermaid `stateDiagram-v2`: a line an edge, with its rule."""
@@ -153,52 +211,3 @@ class GaitGraph:
             rule = f"{edge.statistic} {edge.rule.when} {edge.rule.alpha:g} {unit}".rstrip()
             lines.append(f"    {edge.source} --> {edge.target} : {rule}, k over {edge.rule.beta:g}")
         return "\n".join(lines) + "\n"
-
-
-def _read(data: dict[str, object]) -> GaitGraph:
-    table = Table(data, keys=("start", "reset", "statistic", "edge"))
-    watched: dict[str, AnyStatistic] = {}
-    for name, described in table.table("statistic").items():
-        with located(f"statistic {name}"):
-            watched[name] = statistic(described)
-    edges: list[Edge] = []
-    for number, described in enumerate(table.tables("edge"), 1):
-        with located(f"edge {number}"):
-            edges.append(_edge(described))
-    return GaitGraph(
-        start=table.text("start"),
-        statistics=watched,
-        edges=tuple(edges),
-        reset=table.flag("reset", default=True),
-    )
-
-
-def _edge(data: object) -> Edge:
-    table = Table(data, keys=("from", "to", "statistic", "priority", "alpha_over", *_RULE))
-    when = table.text("when") if table.has("when") else "above"
-    if when not in ("above", "below"):
-        raise GaitshiftError(f"'when' must be above or below, got {when!r}")
-    return Edge(
-        source=table.text("from"),
-        target=table.text("to"),
-        statistic=table.text("statistic"),
-        priority=table.whole("priority", default=0),
-        modulation=_modulation(table.get("alpha_over")) if table.has("alpha_over") else None,
-        rule=Rule(
-            when=when,
-            alpha=table.number("alpha"),
-            beta=table.number("beta"),
-            epsilon=table.number("epsilon", default=1.0),
-            leak=table.number("leak", default=0.0),
-            hold=table.number("hold", default=0.0),
-        ),
-    )
-
-
-def _modulation(data: object) -> Modulation:
-    with located("alpha_over"):
-        table = Table(data, keys=("of", "points"))
-        of = table.text("of")
-        if of not in ("speed", "time"):
-            raise GaitshiftError(f"'of' must be speed or time, got {of!r}")
-        return Modulation(of=of, points=table.points("points"))

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
 
 QUANTITIES = ("speed", "time")
 """What α may follow: the commanded forward speed [m/s], or the time [s]."""
@@ -37,9 +37,9 @@ class Modulation:
                 f"{list(map(list, self.points))}"
             )
 
-    def factor(self, signals: Signals) -> Float[np.ndarray, " N"]:
+    def factor(self, sensed: Proprioception) -> Float[np.ndarray, " N"]:
         """Factor on each robot's α now."""
         at, factors = zip(*self.points, strict=True)
         if self.of == "time":
-            return np.full(signals.robots, float(np.interp(signals.time, at, factors)))
-        return np.interp(signals.need("speed_command", "α over speed"), at, factors)
+            return np.full(len(sensed.contact), float(np.interp(sensed.time, at, factors)))
+        return np.interp(sensed.need("forward_speed_command", "α over speed"), at, factors)

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import Command
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.state import Privileged, Proprioception
 
 BonusMode = Literal["add", "multiply_clipped", "multiply"]
 BONUS_MODES: tuple[BonusMode, ...] = ("add", "multiply_clipped", "multiply")
@@ -25,10 +25,10 @@ ADDITIONS = (
     "chatter",
     "action_rate",
 )
-"""The terms that are ours; every other one is Table I's."""
+"""The terms that are ours; all others are those of Table I."""
 
 BONUS_SHARES = ("bonus_swing", "bonus_punctuality")
-"""What makes the bonus depend on how a change came about; ours."""
+"""Settings by which the bonus depends on swing height and punctuality; ours."""
 
 RewardTerms = dict[str, Float[np.ndarray, " N"]]
 """The weighted terms of R_walk by name, each (N,)."""
@@ -53,33 +53,34 @@ class RewardConfig:
     joint_velocity: float = -0.01
     """Times ‖q̇‖² [s²] (Table I)."""
     speed_tracking: float = 15.0
-    """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: Table I's bell is so wide that a walk at 1 m/s
-    in place of 1.2 m/s loses 4 % of it."""
+    """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: the term of Table I is so wide that a walk at
+    1 m/s in place of 1.2 m/s loses only 4 % of it."""
     stance_feet: float = 12.0
-    """Times the share of the feet that are, down or up, as the stance of the present state has
-    them; ours: the bonus pays the instant of a change only, and this tells each foot apart."""
+    """Times the share of the feet whose contact agrees with the stance of the present state; ours:
+    the bonus rewards only the instant of a change, this term each foot at every step."""
     stance_pattern: float = 12.0
-    """Where that share is 1; ours: else three right feet out of four would do."""
+    """Where that share is 1; ours: without it three correct feet out of four are good enough."""
     slip: float = -0.5
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
     power: float = -0.0225
-    """Times Σ|τ q̇| [1/W]; ours: the cost of transport itself, which ‖τ‖² and ‖q̇‖² only touch."""
+    """Times Σ|τ q̇| [1/W]; ours: the power in the cost of transport, unlike ‖τ‖² and ‖q̇‖²."""
     chatter: float = -80.0
-    """Times the feet that come down out of place (twice in a swing, or states too early), and the
-    environment's strictness; ours: one touchdown a swing is clean, and free at any frequency."""
+    """Times the number of feet that come down out of place (twice in a swing, or states too early),
+    times the environment's strictness; ours: one touchdown a swing costs nothing, at any
+    frequency."""
     action_rate: float = -0.02
     """Times ‖a - a_last‖²; ours: smooth targets."""
     bonus: float = 200.0
     """b, paid when the machine changes its state (paper III-C)."""
     bonus_swing: float = 1.0
-    """Share of the bonus that is paid by the height of the swing alone, times the environment's
+    """Share of the bonus that depends on the height of the swing, times the environment's
     strictness; ours: without it feet drag."""
     bonus_punctuality: float = 1.0
-    """Share of the bonus that is paid for being on time alone, times the environment's strictness;
-    ours: a stride follows its commanded frequency, and its halves are of one length."""
+    """Share of the bonus that depends on punctuality, times the environment's strictness; ours: it
+    keeps strides at the commanded frequency and their halves equally long."""
     bonus_mode: BonusMode = "add"
-    """How b meets R_walk; ours is `add`, because `multiply` punishes a good change while R_walk is
-    negative (docs/paper.md)."""
+    """How b is combined with R_walk; ours is `add`, because `multiply` penalises a good change
+    while R_walk is negative (docs/paper.md)."""
 
     def __post_init__(self) -> None:
         if self.bonus_mode not in BONUS_MODES:
@@ -95,7 +96,8 @@ class RewardConfig:
 
 def walk_reward(
     config: RewardConfig,
-    motion: Motion,
+    sensed: Proprioception,
+    truth: Privileged,
     command: Command,
     *,
     stance: Float[np.ndarray, " 12"],
@@ -108,32 +110,36 @@ def walk_reward(
 
     Args:
         config: the weights.
-        motion: the motion after the step.
-        command: what was asked for.
+        sensed: proprioception after the step.
+        truth: privileged state after the step.
+        command: the command during the step.
         stance: q_init [rad].
-        agreement: share of the feet that are as the stance of the machine's state has them.
+        agreement: share of the feet whose contact agrees with the stance of the machine's state.
         chatter: number of feet that came down out of place, times the present strictness.
         action_change: action minus the action before it.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """
-    velocity = motion.base_linear_velocity_b
-    rate = motion.base_angular_velocity_b
+    velocity = truth.velocity_b
+    rate = sensed.need("angular_velocity_b", "the reward")
+    torque, joint_position, joint_velocity = (
+        sensed.need(f"joint_{name}", "the reward") for name in ("torque", "position", "velocity")
+    )
     sideways = velocity[:, 1:]
-    speed_error_squared = np.square(command.forward_speed - velocity[:, 0])
-    foot_speed_squared = _squares(motion.foot_velocity_w[..., :2])
+    speed_error_squared = np.square(command.forward_speed - truth.forward_speed)
+    foot_speed_squared = _squares(truth.foot_velocity_w[..., :2])
     terms = {
         "forward_velocity": config.forward_velocity * np.exp(-speed_error_squared),
         "lateral_velocity": config.lateral_velocity * _squares(sideways),
         "roll_pitch_rate": config.roll_pitch_rate * _squares(rate[:, :2]),
         "yaw_rate": config.yaw_rate * np.square(rate[:, 2] - command.yaw_rate),
-        "torque": config.torque * _squares(motion.joint_torque),
-        "joint_position": config.joint_position * _squares(motion.joint_position - stance),
-        "joint_velocity": config.joint_velocity * _squares(motion.joint_velocity),
+        "torque": config.torque * _squares(torque),
+        "joint_position": config.joint_position * _squares(joint_position - stance),
+        "joint_velocity": config.joint_velocity * _squares(joint_velocity),
         "speed_tracking": config.speed_tracking * np.exp(-speed_error_squared / TRACKING_WIDTH**2),
         "stance_feet": config.stance_feet * agreement,
         "stance_pattern": config.stance_pattern * (agreement == 1.0),
-        "slip": config.slip * (foot_speed_squared * motion.contact).sum(axis=1),
-        "power": config.power * np.abs(motion.joint_torque * motion.joint_velocity).sum(axis=1),
+        "slip": config.slip * (foot_speed_squared * sensed.contact).sum(axis=1),
+        "power": config.power * sensed.power,
         "chatter": config.chatter * chatter,
         "action_rate": config.action_rate * _squares(action_change),
     }
@@ -151,14 +157,14 @@ def earned_bonus(
     on_time: Float[np.ndarray, " N"],
     strictness: float,
 ) -> Float[np.ndarray, " N"]:
-    """The edges' factors of the bonus, in the part that the manner of the change has earned.
+    """The edges' factors of the bonus, reduced for low swings and late changes.
 
     Args:
         config: the weights.
         bonus: the edge's own factor, 0 where the machine stayed.
         swing_share: share of the swing height that was reached, in [0, 1].
         on_time: punctuality of the change, in [0, 1].
-        strictness: how much of both is asked for, in [0, 1].
+        strictness: how far the bonus depends on both, in [0, 1].
     """
     swing = 1.0 - strictness * config.bonus_swing * (1.0 - swing_share)
     return bonus * swing * (1.0 - strictness * config.bonus_punctuality * (1.0 - on_time))
@@ -167,7 +173,7 @@ def earned_bonus(
 def with_bonus(
     config: RewardConfig, walk: Float[np.ndarray, " N"], bonus: Float[np.ndarray, " N"]
 ) -> Float[np.ndarray, " N"]:
-    """The reward after δr: R_walk met by b times `bonus` where the machine changed its state.
+    """The reward after δr: R_walk combined with b times `bonus` where the machine changed state.
 
     `add` adds b, `multiply` multiplies R_walk by b, `multiply_clipped` multiplies max(R_walk, 0).
     `bonus` is the edge's own factor, 0 where the machine stayed.

@@ -1,4 +1,4 @@
 """How fast the package is: the environment against bare physics, training against a baseline.
 
-Only `ours` and `baseline` need torch; they are imported when a training is measured.
+Only `trainer` and `baseline` need torch; they are imported when a training is measured.
 """

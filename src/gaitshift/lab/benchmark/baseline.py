@@ -1,17 +1,77 @@
 """The baseline: stable-baselines3's PPO at its defaults, on the same environment (paper IV-A)."""
 
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import torch
 from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from gaitshift.gait import RewardMachine
-from gaitshift.lab.benchmark.vec_env import GaitVecEnv
 from gaitshift.learn.export import describe, write
 from gaitshift.learn.ground import FIELD
 from gaitshift.learn.recipe import Recipe
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
+
+
+class GaitVecEnv(VecEnv):
+    """The same robots, step for step.
+
+    Where an episode ended, `infos` hands over its last observation and whether it was cut: PPO
+    bootstraps from there.
+    """
+
+    def __init__(self, env: GaitEnv) -> None:
+        self.env = env
+        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
+        self._actions = np.zeros((env.num_envs, 12))
+
+    def reset(self) -> np.ndarray:
+        """Starts all episodes anew, from the seed that `seed` was given, if it was."""
+        observation, _ = self.env.reset(seed=self._seeds[0])
+        self._reset_seeds()
+        return observation
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keeps the actions for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
+        """One control step of all robots."""
+        observation, reward, terminated, truncated, info = self.env.step(self._actions)
+        infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
+        done = terminated | truncated
+        for robot in np.flatnonzero(done):
+            infos[robot] = {
+                "terminal_observation": info["final_obs"][robot],
+                "TimeLimit.truncated": bool(truncated[robot]),
+            }
+        return observation, reward, done, infos
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """The attribute of the whole environment, once for each robot."""
+        return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Refused with a `TypeError`: robots share one environment."""
+        raise TypeError(f"robots share one environment: '{attr_name}' of some cannot be set")
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **_: Any
+    ) -> list[Any]:
+        """Refused with a `TypeError`: robots share one environment."""
+        raise TypeError(f"robots share one environment: '{method_name}' of some cannot be called")
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
+        """No robot has a wrapper."""
+        return [False for _ in self._get_indices(indices)]
+
 
 ROBOTS = 30
 """Robots in parallel (paper IV-A)."""
@@ -20,8 +80,8 @@ ROBOTS = 30
 class Baseline:
     """PPO("MlpPolicy") and the flat environment of a recipe, with what it asks for growing alike.
 
-    Strictness and commands are, at each number of control steps, those that the recipe has there,
-    so that both learners are asked for the same.
+    The curriculum is, at each number of control steps, the one that the recipe has there, so that
+    both learners are asked for the same.
     """
 
     def __init__(
@@ -45,8 +105,7 @@ class Baseline:
     def advance(self) -> None:
         """One rollout and the updates from it."""
         iteration = self.steps // (self._recipe.robots * self._recipe.steps)
-        self._env.strictness = self._recipe.strictness(iteration)
-        self._env.command_scale = self._recipe.command_scale(iteration)
+        self._env.curriculum = self._recipe.curriculum(iteration)
         self._ppo.learn(self._ppo.n_steps * ROBOTS, reset_num_timesteps=False)
 
     def export(self) -> Path:

@@ -6,7 +6,7 @@ from math import floor
 from typing import Any
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.table import Columns, Row
+from gaitshift.table import Columns, Row
 
 
 @dataclass(frozen=True, kw_only=True)

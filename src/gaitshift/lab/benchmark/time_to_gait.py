@@ -1,4 +1,4 @@
-"""Time to gait: how long training takes until a check is passed, beside a baseline's."""
+"""Time to gait: how long training takes until a policy meets a criterion, beside a baseline's."""
 
 import hashlib
 import json
@@ -8,16 +8,66 @@ from dataclasses import asdict, dataclass, field, replace
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Protocol
+from typing import Protocol, cast
 
 from gaitshift.control import policy
+from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
-from gaitshift.lab.benchmark.check import Check
 from gaitshift.lab.benchmark.outcome import Outcome
+from gaitshift.lab.evaluation import EvaluationConfig, evaluate
 from gaitshift.learn.recipe import Recipe
 
-OURS, BASELINE = "gaitshift", "stable-baselines3"
+
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """What a check saw, after the evaluation's warm-up of 2 s."""
+
+    survival: float
+    """Share of the robots that did not fall."""
+    speed: float | None
+    """Mean forward speed [m/s]; None where all fell in the warm-up."""
+    pattern_fraction: float | None
+    """Share of the steps that show a stance of the gait's machine; None as well."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Criterion:
+    """Robots on flat ground without exploration noise, and what they must reach there."""
+
+    survival: float = 0.99
+    """Least share of robots that do not fall."""
+    speed_error: float = 0.1
+    """Greatest |mean forward speed - the gait's own| [m/s]."""
+    pattern_fraction: float = 0.6
+    """Least share of steps that show a stance of the machine."""
+    robots: int = 64
+    """Robots at once, so that at 0.99 not one may fall."""
+    seconds: float = 6.0
+    """Length of the run [s]."""
+
+    def see(self, policy: Policy) -> Figures:
+        """Runs the policy at its own speed and stride frequency; the same figures every time."""
+        config = EvaluationConfig(episodes=self.robots, seconds=self.seconds)
+        seen, _ = evaluate(policy, config)
+        return Figures(
+            survival=cast(float, seen["survival"]),
+            speed=cast("float | None", seen["speed_mean"]),
+            pattern_fraction=cast("float | None", seen["pattern_fraction"]),
+        )
+
+    def is_passed(self, figures: Figures, own_speed: float) -> bool:
+        """Whether the figures are those of the gait at `own_speed` [m/s]."""
+        if figures.speed is None or figures.pattern_fraction is None:
+            return False
+        return (
+            figures.survival >= self.survival
+            and abs(figures.speed - own_speed) <= self.speed_error
+            and figures.pattern_fraction >= self.pattern_fraction
+        )
+
+
+GAITSHIFT, BASELINE = "gaitshift", "stable-baselines3"
 """The learners, as outcomes name them."""
 
 
@@ -40,7 +90,7 @@ class TimeToGait:
     """Training time after which a baseline is given up [s]; 0: no baseline."""
     recipe: Recipe = field(default_factory=_flat_stage)
     """Ours: the flat stage of the default recipe, at whose end it is given up."""
-    check: Check = field(default_factory=Check)
+    check: Criterion = field(default_factory=Criterion)
     """What ends a training."""
     check_every: int = 10
     """Iterations of ours between two checks; half a baseline's rollout at its defaults."""
@@ -75,13 +125,13 @@ class TimeToGait:
             seeds=1,
             baseline_budget=1.0,
             recipe=replace(Recipe().with_iterations(2), robots=8),
-            check=Check(robots=8, seconds=2.5),
+            check=Criterion(robots=8, seconds=2.5),
             check_every=1,
             baseline_rollout=32,
         )
 
 
-class Learner(Protocol):
+class Trainer(Protocol):
     """A training that goes on from check to check."""
 
     @property
@@ -103,7 +153,7 @@ class _Entry:
     """A learner in the race, and when it is given up."""
 
     name: str
-    build: Callable[[RewardMachine, int, Path], Learner]
+    build: Callable[[RewardMachine, int, Path], Trainer]
     most_steps: float = inf
     most_seconds: float = inf
 
@@ -124,7 +174,7 @@ def fingerprint(config: TimeToGait, learner: str, machine: RewardMachine) -> str
         "machine": machine.to_dict(),
         "recipe": asdict(config.recipe),
         "check": asdict(config.check),
-        "rollout": config.check_every if learner == OURS else config.baseline_rollout,
+        "rollout": config.check_every if learner == GAITSHIFT else config.baseline_rollout,
     }
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
 
@@ -156,11 +206,11 @@ def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator
 def _entries(config: TimeToGait) -> list[_Entry]:
     recipe = config.recipe
     try:
-        from gaitshift.lab.benchmark.ours import Ours
+        from gaitshift.lab.benchmark.trainer import GaitshiftTrainer
 
         ours = _Entry(
-            name=OURS,
-            build=lambda machine, seed, folder: Ours(
+            name=GAITSHIFT,
+            build=lambda machine, seed, folder: GaitshiftTrainer(
                 machine, recipe, seed, folder, iterations=config.check_every
             ),
             most_steps=recipe.iterations * recipe.robots * recipe.steps,

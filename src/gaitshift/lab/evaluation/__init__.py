@@ -8,7 +8,7 @@ from gaitshift.lab.evaluation.demo import summarise as summarise
 from gaitshift.lab.evaluation.evaluate import EvaluationConfig as EvaluationConfig
 from gaitshift.lab.evaluation.evaluate import evaluate as evaluate
 from gaitshift.lab.evaluation.evaluate import evaluate_controller as evaluate_controller
-from gaitshift.lab.evaluation.glance import glance as glance
+from gaitshift.lab.evaluation.evaluate import flat_verdict as flat_verdict
 from gaitshift.lab.evaluation.rollout import RolloutConfig as RolloutConfig
 from gaitshift.lab.evaluation.rollout import rollout as rollout
 from gaitshift.lab.evaluation.trials import SIZES as SIZES

@@ -1,4 +1,4 @@
-"""How well a policy does what it is asked for, over the whole range it was trained for."""
+"""How well a policy follows its commands, over the whole range of its training."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from gaitshift.control.policy import Policy
 from gaitshift.lab.evaluation.evaluate import EvaluationConfig, evaluate
 
 POINTS = 5
-"""Commands of a range that are tried, its ends among them."""
+"""Number of commands tried in a range, its ends included."""
 
 ROBOTS, SECONDS = 16, 6.0
 """Robots of each run and its length [s]."""
@@ -18,12 +18,12 @@ ROBOTS, SECONDS = 16, 6.0
 
 @dataclass(frozen=True, kw_only=True)
 class Followed:
-    """What came of one pair of commands on flat ground; the first 2 s are left out."""
+    """Result of one pair of commands on flat ground, without the first 2 s."""
 
     forward_speed: float
-    """Asked for [m/s]."""
+    """Commanded [m/s]."""
     stride_frequency: float
-    """Asked for [Hz]."""
+    """Commanded [Hz]."""
     speed_mean: float | None
     """Measured [m/s]."""
     cycles_per_s: float | None
@@ -37,9 +37,9 @@ class Followed:
 def follow_commands(
     policy: Policy, seed: int = 0, report: Callable[[int, int], None] = lambda done, total: None
 ) -> list[Followed]:
-    """Speeds over their range at the gait's own frequency, then frequencies at its own speed.
+    """Speeds over their range at the nominal frequency, then frequencies at the nominal speed.
 
-    `report` is called with the runs done and the runs in all.
+    `report` is called with the number of runs done and the total.
     """
     info = policy.info
     own = (info.forward_speed, info.stride_frequency)

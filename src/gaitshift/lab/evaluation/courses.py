@@ -1,19 +1,19 @@
-"""The standard courses: grounds to record on, for conditions to be identified with."""
+"""The standard courses: grounds on which logs for identification are recorded."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gaitshift.control.policy import Policy
+from gaitshift.control import Controller
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.evaluation.evaluate import EvaluationConfig, run_policy
+from gaitshift.lab.evaluation.evaluate import EvaluationConfig, run_controller
 from gaitshift.lab.log import Log
 
 AMPLITUDES = (0.05, 0.07, 0.10, 0.15, 0.20)
-"""Of the noise that robots walk into, and out of [m]."""
+"""Amplitudes of the noise that robots walk onto and off [m]."""
 
 _UNTIL = (10.0, 18.0, 12.0, 16.0, 14.0)
-"""Where the noise ends that robots walk out of, amplitude by amplitude [m]: were it always the same
-place, a clock would notice it best."""
+"""Where the noise ends that robots walk off, for each amplitude [m]. The places differ, because
+otherwise a clock would be the best detector of the end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,13 +21,13 @@ class Course:
     """A ground to record on."""
 
     name: str
-    """In words that a file name may have."""
+    """Name, valid as part of a file name."""
     terrain: str
-    """Its spec; robots start 2 m after its beginning."""
+    """Its spec; robots start 2 m after the beginning of the ground."""
 
 
 def _smooth() -> tuple[Course, ...]:
-    """What a condition should take for smooth."""
+    """Courses that a condition should treat as smooth."""
     steps, stairs = ",".join(["step:0.05@6"] * 5), ",".join(["stairs:0.05@9"] * 4)
     return (
         Course(name="flat", terrain="flat"),
@@ -54,8 +54,8 @@ COURSES = (
         for a, end in zip(AMPLITUDES, _UNTIL, strict=True)
     ),
 )
-"""Ours: one edge every 6 m, ten stairs up and down every 9 m, noise of 10 m between level ground,
-and noise from the start that ends after 8 to 16 m."""
+"""Ours: one edge every 6 m, ten stairs up and down every 9 m, 10 m of noise between level ground,
+and noise from the start on that ends 8 to 16 m after the robots' start."""
 
 
 def select(names: tuple[str, ...]) -> tuple[Course, ...]:
@@ -72,14 +72,15 @@ def select(names: tuple[str, ...]) -> tuple[Course, ...]:
 
 
 def run_course(
-    policy: Policy,
+    controller: Controller,
     course: Course,
     *,
-    robots: int,
     seconds: float,
     seed: int,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
     """Robots in one gait on a course, on eight grounds of a seed where the ground is random."""
-    config = EvaluationConfig(terrain=course.terrain, episodes=robots, seconds=seconds, seed=seed)
-    return run_policy(policy, config, values=True, report=report)
+    config = EvaluationConfig(
+        terrain=course.terrain, episodes=controller.n, seconds=seconds, seed=seed
+    )
+    return run_controller(controller, config, values=True, report=report)

@@ -1,24 +1,24 @@
 """The demonstration: a robot that crosses a track and shifts its gait itself, or on a schedule."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from gaitshift.control import Autonomous, Controller, Driver, Scheduled, Switcher
-from gaitshift.control.cpg import GAITS, CpgController
-from gaitshift.control.policy import Policy
+from gaitshift.control import Autonomous, Scheduled, Switcher
+from gaitshift.control.controllers import ControllerMaker, controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
-from gaitshift.shift import GaitGraph, load_condition
+from gaitshift.shift import GaitGraph, between, load_graph, tuned
+from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.sim.terrain import Terrain, from_spec
 from gaitshift.sim.world import World
 
 RUN_OUT = 8.0
-"""Level metres behind the finish, for robots that wait there for the slower ones."""
+"""Metres of level ground behind the finish, where faster robots wait for slower ones."""
 
 WIDTH = 8.0
 """Width of a track [m]."""
@@ -33,17 +33,18 @@ _NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
 
 @dataclass(frozen=True, kw_only=True)
 class DemoConfig:
-    """What the demonstration shows."""
+    """Settings of the demonstration."""
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
-    """Terrain: pieces with lengths in metres; see `evaluate --terrain` for pieces."""
-    flat_gait: str = "trot"
-    """Gait on flat ground and at the start."""
-    rough_gait: str = "bound"
-    """Gait on rough ground."""
-    condition: str = "touchdown_surprise"
-    """Shift condition: `touchdown_surprise`, which does not fire on slopes and steps;
-    `height_difference`, the paper's statistic with our settings; `paper`, with the paper's."""
+    """The ground, piece by piece with lengths in metres; pieces as in `evaluate --terrain`."""
+    flat_gait: str = ""
+    """The gait on flat ground, and at the start; that of the graph by default."""
+    rough_gait: str = ""
+    """The gait on rough ground; that of the graph by default."""
+    graph: str = DEFAULT
+    """When to shift: a shipped gait graph by name, or a TOML file. `terrain`, which
+    does not fire on slopes and steps; `height_difference`, the paper's statistic with our numbers;
+    `paper`, with the paper's; all three between the two gaits above."""
     alpha: float | None = None
     """α: values above it count as rough [m]; as for the settings below, the default is that of
     the condition."""
@@ -56,12 +57,10 @@ class DemoConfig:
     beta_back: float | None = None
     """β': shift back when k exceeds it [counts]."""
     hold: float | None = None
-    """Least time in a gait between two shifts [s]."""
-    controller: Literal["policy", "cpg"] = "policy"
-    """Controller: trained policies, or coupled oscillators without learning (trot, pace, bound,
-    walk), which are slow and only cross low noise."""
-    graph: str = ""
-    """Gait graph, in place of the two gaits and the condition: a shipped graph or a .toml file."""
+    """Least time in either gait [s]."""
+    controller: str = "policy"
+    """What walks, by name: `policy`, trained policies; `cpg`, coupled oscillators that learned
+    nothing (trot, pace, bound, walk), which go slowly and on low noise alone."""
     gaits: tuple[str, ...] = ()
     """Gaits to show in sequence on a schedule, in place of the condition."""
     every: float = 3.0
@@ -80,11 +79,6 @@ class DemoConfig:
             raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if not 0.2 <= self.every <= 60:
             raise GaitshiftError(f"every must be 0.2 to 60 s, got {self.every}")
-        given = [name for name in _NUMBERS if getattr(self, name) is not None]
-        if self.graph and given:
-            raise GaitshiftError(
-                f"{given[0]} must not be given with a graph; change it in the graph's file"
-            )
         if len(self.gaits) == 1:
             raise GaitshiftError(f"gaits must name two gaits or more, got {self.gaits[0]} alone")
 
@@ -98,42 +92,51 @@ class DemoConfig:
 
     @property
     def shift_times(self) -> tuple[float, ...]:
-        """When the shifts of a schedule are due [s]."""
+        """Times of the scheduled shifts [s]."""
         return self.at or tuple(self.every * i for i in range(1, len(self.gaits)))
 
     @property
     def used(self) -> tuple[str, ...]:
-        """The gaits that appear, each once, the first first."""
+        """The gaits that appear, each once, in order of appearance."""
         return tuple(dict.fromkeys(self.gaits)) or self.ways.gaits
 
     @property
     def ways(self) -> GaitGraph:
-        """The gait graph that the robots shift by; `GaitshiftError` where it cannot be had."""
-        if self.graph:
-            return GaitGraph.load(self.graph)
-        condition = load_condition(self.condition, **{k: getattr(self, k) for k in _NUMBERS})
-        return GaitGraph.of(condition, flat=self.flat_gait, rough=self.rough_gait)
+        """The gait graph by which the robots shift; `GaitshiftError` where it cannot be built."""
+        graph = load_graph(self.graph)
+        gaits = {
+            "flat": self.flat_gait or graph.gaits[0],
+            "rough": self.rough_gait or graph.gaits[1],
+        }
+        if self.flat_gait or self.rough_gait:
+            graph = between(graph, **gaits)
+        return tuned(graph, **{name: getattr(self, name) for name in _NUMBERS})
 
 
 def run_demo(
     config: DemoConfig,
-    policies: Mapping[str, Policy],
     report: Callable[[int, int], None] = lambda done, total: None,
+    *,
+    make: ControllerMaker | None = None,
 ) -> tuple[Log, list[dict[str, Any]]]:
-    """Runs the demonstration: the log of all robots, and a summary for each."""
+    """Runs the demonstration: the log of all robots, and a summary for each.
+
+    `make` makes the controller, in place of the one that the config names.
+    """
     n = config.episodes
     rng = np.random.default_rng(config.seed)
-    driver = _controller(config, policies)
+    used, make = config.used, make or controller_maker(config.controller)
+    controller = make(used, n)
     switcher = _switcher(config)
     grounds = [_ground(config, config.seed + i) for i in range(n)]
     finish = _finish(config, grounds[0])
-    slowest = _slowest(config, policies)
+    slowest = float(controller.repertoire.forward_speed.min())
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
-    world = World(driver.robot, grounds, n, gains=driver.gains)
+    world = World(controller.robot, grounds, n, gains=controller.gains)
     start = np.tile([START, 0.0], (n, 1))
     log = rollout(
         world,
-        driver,
+        controller,
         run,
         start_xy=start,
         rng=rng,
@@ -145,11 +148,11 @@ def run_demo(
 
 
 def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
-    """What one robot did until it crossed `finish` [m] or the run ended.
+    """Summary of one robot until it crossed `finish` [m] or the run ended.
 
-    Survival, distance, mean speed, and every shift of gait.
+    It has survival, distance, mean speed, and every gait shift.
     """
-    x = log.qpos[:, robot, 0]
+    x = log.truth.base_position_w[:, robot, 0]
     crossed = np.flatnonzero(x >= finish)
     end = int(crossed[0]) + 1 if crossed.size else len(x)
     gait = log.gait[:end, robot]
@@ -174,20 +177,6 @@ def summarise(log: Log, robot: int, finish: float = np.inf) -> dict[str, Any]:
     }
 
 
-def _controller(config: DemoConfig, policies: Mapping[str, Policy]) -> Controller:
-    used, n = config.used, config.episodes
-    if config.controller == "cpg":
-        return CpgController(used, n, start=used[0])
-    return Driver({gait: policies[gait] for gait in used}, n, start=used[0])
-
-
-def _slowest(config: DemoConfig, policies: Mapping[str, Policy]) -> float:
-    """Speed of the slowest gait that appears [m/s]."""
-    if config.controller == "cpg":
-        return min(GAITS[gait].speed for gait in config.used)
-    return min(policies[gait].info.forward_speed for gait in config.used)
-
-
 def _switcher(config: DemoConfig) -> Switcher:
     if config.gaits:
         return Scheduled(tuple(zip(config.shift_times, config.gaits[1:], strict=True)))
@@ -205,7 +194,7 @@ def _finish(config: DemoConfig, ground: Terrain) -> float:
 
 
 def _seconds(config: DemoConfig, finish: float, speed: float) -> float:
-    """Long enough for a robot at two thirds of the commanded speed [m/s]."""
+    """Time that a robot needs at two thirds of the commanded speed `speed` [m/s]."""
     if config.gaits:
         return config.shift_times[-1] + config.every
     return 1.5 * (finish - START) / speed

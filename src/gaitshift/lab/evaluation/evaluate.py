@@ -1,4 +1,4 @@
-"""Judges one policy, or another controller: many robots at once on a ground given by its spec."""
+"""Evaluates a policy or another controller: many robots at once on a ground given by its spec."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,16 +11,15 @@ from jaxtyping import Float
 from gaitshift.control import Controller, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait import gaits
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import measure, robot_mass
+from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.sim.terrain import Terrain, from_spec
 from gaitshift.sim.world import PushConfig, World
 
 FIELDS = 8
-"""Different grounds that the robots share where the ground is random."""
+"""Number of different grounds among which robots are divided where the ground is random."""
 
 FIELD_WIDTH = 12.0
 """[m]"""
@@ -29,17 +28,16 @@ RUN_UP = 2.0
 """Metres of ground behind the start."""
 
 MARGIN, LEAST_MARGIN = 0.25, 1.0
-"""Ground beyond what robots are asked for: a share of it, and so many metres at least; ours: down a
-slope of 10° shipped policies come 11 % further than they are asked to."""
+"""Ground beyond the commanded distance: a share of that distance, and the least length [m]; ours:
+down a slope of 10° shipped policies walk 11 % further than commanded."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluationConfig:
-    """What a policy is put through."""
+    """Settings of an evaluation."""
 
     terrain: str = "flat"
-    """Terrain: flat, perlin:A, slope:DEG, bank:DEG, stairs:H, step:H, pebbles:H, or a track of
-    pieces with lengths, such as flat@8,perlin:0.10@12."""
+    """Spec of the ground: one piece, or a track of them (`sim.terrain.spec_help`)."""
     episodes: int = 256
     """Number of robots; each runs one episode."""
     seconds: float = 10.0
@@ -78,8 +76,7 @@ def evaluate(
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[dict[str, Any], Log]:
     """Runs the deterministic policy and measures it (`gait_analysis.measure`)."""
-    log = run_policy(policy, config, report=report)
-    return measure(log, {policy.gait: policy.machine}, mass=robot_mass(policy.robot.name)), log
+    return evaluate_controller(_driver(policy, config), config, report)
 
 
 def evaluate_controller(
@@ -87,14 +84,11 @@ def evaluate_controller(
     config: EvaluationConfig,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[dict[str, Any], Log]:
-    """Runs robots that are all in one gait, and measures them by that gait's own machine.
-
-    Raises:
-        GaitshiftError: a gait of the controller has no machine of its name.
-    """
+    """Runs robots that are all in one gait, and measures them with that gait's machine."""
     log = run_controller(controller, config, report=report)
-    machines = {name: gaits.load(name) for name in controller.gaits}
-    return measure(log, machines, mass=robot_mass(controller.robot.name)), log
+    known = controller.repertoire
+    machines = dict(zip(known.gaits, known.machines, strict=True))
+    return measure(log, machines, controller.robot), log
 
 
 def run_policy(
@@ -105,12 +99,16 @@ def run_policy(
     values: bool = False,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
-    """Runs the deterministic policy; ends early when nobody is on the way to `finish_x` [m].
+    """Runs the deterministic policy; ends early when no robot still walks towards `finish_x` [m].
 
-    With `values` the log keeps what the policy's critic expects.
+    With `values` the log keeps the values of the policy's critic.
     """
-    driver = Driver({policy.gait: policy}, config.episodes, start=policy.gait)
+    driver = _driver(policy, config)
     return run_controller(driver, config, finish_x=finish_x, values=values, report=report)
+
+
+def _driver(policy: Policy, config: EvaluationConfig) -> Driver:
+    return Driver({policy.gait: policy}, config.episodes, start=policy.gait)
 
 
 def run_controller(
@@ -131,7 +129,7 @@ def run_controller(
         speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
         values=values,
     )
-    own = float(controller.own_command().forward_speed.max())
+    own = float(controller.repertoire.own_command(controller.gait).forward_speed.max())
     speed = own if config.speed is None else config.speed
     grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
     world = World(controller.robot, grounds, controller.n, gains=controller.gains)
@@ -142,17 +140,18 @@ def run_controller(
 
 
 def field_length(speed: float, seconds: float) -> float:
-    """Length of ground [m] for robots at a speed [m/s]: a quarter more than they are asked for."""
+    """Length of ground [m] for robots at a speed [m/s]: a quarter more than commanded."""
     return 2 * RUN_UP + (1 + MARGIN) * speed * seconds
 
 
 def starts(controller: Controller, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-    """Where its robots begin [m].
+    """Starting points of its robots [m].
 
-    Spread over the width, so that robots on one field do not walk over the same ground, and over a
-    stride, so that they meet an edge at all instants of it.
+    They are spread over the width, so that robots on one field do not walk over the same ground,
+    and over a stride along x, so that robots reach an edge at all phases of the stride.
     """
-    n, command = controller.n, controller.own_command()
+    n = controller.n
+    command = controller.repertoire.own_command(controller.gait)
     stride = command.forward_speed / command.stride_frequency
     start = np.zeros((n, 2))
     start[:, 1] = rng.uniform(-FIELD_WIDTH / 4, FIELD_WIDTH / 4, n)
@@ -161,13 +160,13 @@ def starts(controller: Controller, rng: np.random.Generator) -> Float[np.ndarray
 
 
 def grounds_of(terrain: str, *, seed: int, speed: float, seconds: float) -> list[Terrain]:
-    """The grounds that robots share: one where all seeds give the same, else `FIELDS`.
+    """The grounds for all robots: one where the ground is not random, else `FIELDS`.
 
     They begin `RUN_UP` behind the start, and are long enough for a speed [m/s] and time [s].
 
     Raises:
-        GaitshiftError: a spec with a length of its own that is too short for them, on ground that
-            is not flat: beyond its end there is nothing to stand on. Flat ground has no end.
+        GaitshiftError: the spec has its own length, which is too short, and the ground is not flat.
+            There is no ground beyond its end, while flat ground has no end.
     """
     length = field_length(speed, seconds)
     grounds: list[Terrain] = []
@@ -189,3 +188,43 @@ def _check_length(ground: Terrain, spec: str, *, speed: float, seconds: float) -
             f"{speed:g} m/s, {RUN_UP:g} m of it behind the start, got {ground.size[0]:g} m; give a "
             "longer terrain or fewer seconds"
         )
+
+
+VERDICT_ROBOTS, VERDICT_SECONDS = 16, 5.0
+"""Robots and length [s]; ours: seven to twelve strides of each after the 2 s left out."""
+
+VERDICT_FIGURES = (
+    "survival",
+    "speed_mean",
+    "pattern_fraction",
+    "cycles_per_s",
+    "cost_of_transport",
+)
+
+
+def flat_verdict(policy: Policy) -> dict[str, Any]:
+    """The verdict on a policy on flat ground, at its nominal speed and stride frequency.
+
+    `gait` is the name by the contacts alone. `clean` is true if that name is the policy's gait and
+    all limits are met. `misses` lists the figures that miss their limits, with the worst foot,
+    separated by "; ". The other figures are defined in `gait_analysis.measure`.
+    """
+    figures, _ = evaluate(
+        policy, EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS)
+    )
+    verdict = figures["verdict"]
+    return {
+        "gait": verdict["gait"],
+        "clean": verdict["clean"],
+        **{name: _rounded(figures[name]) for name in VERDICT_FIGURES},
+        "misses": "; ".join(_spell(miss) for miss in verdict["misses"]),
+    }
+
+
+def _spell(miss: dict[str, Any]) -> str:
+    parts = (miss["figure"], miss.get("foot"), _rounded(miss["value"]))
+    return " ".join(str(part) for part in parts if part is not None)
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else float(f"{value:.4g}")

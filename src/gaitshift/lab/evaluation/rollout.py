@@ -6,9 +6,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.control import Controller, Decision, Switcher
+from gaitshift.control import Controller, Switcher
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
+from gaitshift.shift import Decision
 from gaitshift.sim.world import PushConfig, Pusher, World
 
 
@@ -44,36 +45,38 @@ OVER_THE_EDGE = 0.5
 
 
 class Walk:
-    """N robots on their way along x, a control step at a time."""
+    """N robots that walk along x, one control step at a time."""
 
     def __init__(
         self,
         world: World,
-        driver: Controller,
+        controller: Controller,
         config: RolloutConfig,
         *,
         start_xy: Float[np.ndarray, "N 2"],
         rng: np.random.Generator,
         switcher: Switcher | None = None,
     ) -> None:
-        """Sets all robots of `world` down at `start_xy` [m], each to walk on its own line."""
-        self.world, self.driver, self.switcher = world, driver, switcher
+        """Places all robots of `world` at `start_xy` [m]; each walks along its own line."""
+        self.world, self.controller, self.switcher = world, controller, switcher
         self.config = config
-        """May be replaced between two steps, to ask for another speed."""
+        """May be replaced between two steps, to command another speed."""
         n = world.n
         noise = rng.uniform(-config.joint_noise, config.joint_noise, (n, 12))
-        self._stance = driver.robot.stance_angles
+        self._stance = controller.robot.stance_angles
         world.place(np.arange(n), xy=start_xy, yaw=np.zeros(n), joint_position=self._stance + noise)
         self._pusher = Pusher(config.push, n, rng)
         self._start_y = start_xy[:, 1]
         self.fallen: Bool[np.ndarray, " N"] = np.zeros(n, dtype=bool)
-        """Who has fallen by now."""
+        """Which robots have fallen so far."""
         self.steps = 0
         """Control steps so far."""
         self.decision: Decision | None = None
-        """What the switcher saw in the last step."""
+        """The switcher's decision in the last step."""
         self.wanted = self._command()
-        """The command in the last step; the speed asked for is trimmed about it."""
+        """The command in the last step, before the speed loop's trim."""
+        self.sensed = world.sensed
+        """Proprioception in the last step, with the time and the command."""
         self._asked = self.wanted
         self._speed_state = config.speed_loop.start(n)
 
@@ -87,44 +90,51 @@ class Walk:
         see: Callable[[], None] = lambda: None,
         force_w: Float[np.ndarray, "N 3"] | float = 0.0,
     ) -> None:
-        """One control step; `see` is called at its end, before the next command is made.
+        """One control step; `see` is called at its end, before the next command is computed.
 
-        `force_w` [N] acts on the bases beside the pushes of the config.
+        `force_w` [N] acts on the bases in addition to the pushes of the config.
         """
-        world, driver = self.world, self.driver
-        target = driver.act(world.motion, self._asked)
+        world, controller = self.world, self.controller
+        target = controller.act(world.sensed, self._asked)
         target[self.fallen] = self._stance
         world.push(self._pusher.step() + force_w)
-        motion = world.step(target)
+        sensed, truth = world.step(target)
         self.steps += 1
-        is_off = (motion.clearance < -OVER_THE_EDGE).all(axis=1)
-        self.fallen = self.fallen | motion.body_contact | is_off
-        driver.see(motion, self._asked)
+        is_off = (truth.clearance < -OVER_THE_EDGE).all(axis=1)
+        self.fallen = self.fallen | truth.body_contact | is_off
+        controller.see(sensed, self._asked)
+        self.sensed = replace(
+            sensed,
+            time=self.time,
+            forward_speed_command=self.wanted.forward_speed,
+            yaw_rate_command=self.wanted.yaw_rate,
+            stride_frequency_command=self.wanted.stride_frequency,
+            value=controller.value() if self.config.values else None,
+        )
         if self.switcher is not None:
-            self.decision = self.switcher.step(self.time, motion, driver, self.wanted)
+            self.decision = self.switcher.step(self.sensed, controller, truth)
         see()
         self.wanted = self._command()
-        forward = motion.base_linear_velocity_b[:, 0]
         self._speed_state, asked = self.config.speed_loop.step(
-            self._speed_state, self.wanted.forward_speed, forward
+            self._speed_state, self.wanted.forward_speed, sensed.forward_speed
         )
         self._asked = replace(self.wanted, forward_speed=asked)
 
     def _command(self) -> Command:
-        config, motion, n = self.config, self.world.motion, self.driver.n
-        own = self.driver.own_command()
-        lateral = motion.base_position_w[:, 1] - self._start_y
+        config, controller, n = self.config, self.controller, self.controller.n
+        own = controller.repertoire.own_command(controller.gait)
+        lateral = self.world.truth.base_position_w[:, 1] - self._start_y
         speed, frequency = config.speed, config.stride_frequency
         return Command(
             forward_speed=own.forward_speed if speed is None else np.full(n, speed),
-            yaw_rate=config.heading_loop.yaw_rate(motion.yaw, np.zeros(n), lateral),
+            yaw_rate=config.heading_loop.yaw_rate(self.world.sensed.yaw, np.zeros(n), lateral),
             stride_frequency=own.stride_frequency if frequency is None else np.full(n, frequency),
         )
 
 
 def rollout(
     world: World,
-    driver: Controller,
+    controller: Controller,
     config: RolloutConfig,
     *,
     start_xy: Float[np.ndarray, "N 2"],
@@ -136,89 +146,64 @@ def rollout(
     """Runs all robots of `world` along x from `start_xy` [m], each on its own line.
 
     The run ends early when every robot has fallen or passed `finish_x` [m]. `report` is called with
-    the steps done and the steps in all.
+    the number of steps done and the total.
     """
-    walk = Walk(world, driver, config, start_xy=start_xy, rng=rng, switcher=switcher)
+    walk = Walk(world, controller, config, start_xy=start_xy, rng=rng, switcher=switcher)
     recorder = Recorder(walk)
     for step in range(config.steps):
         walk.step(recorder.add)
         if step % 25 == 24:
             report(step + 1, config.steps)
-        if (walk.fallen | (world.motion.base_position_w[:, 0] >= finish_x)).all():
+        if (walk.fallen | (world.truth.base_position_w[:, 0] >= finish_x)).all():
             break
     report(config.steps, config.steps)
     return recorder.log()
 
 
-_KEPT_AS = {
-    "qpos": np.float32,
-    "qvel": np.float32,
-    "torque": np.float32,
-    "foot_position_w": np.float32,
-    "clearance": np.float32,
-    "foot_height": np.float32,
-    "value": np.float32,
-    "gait": np.int16,
-    "machine_state": np.int16,
-}
-"""Columns whose full precision nobody needs: a robot's second then takes 35 kB."""
-
-
 class Recorder:
-    """Collects what a `Log` of a walk is made of."""
+    """Collects the steps of a walk's `Log` in single precision: 45 kB per robot and second."""
 
     def __init__(self, walk: Walk) -> None:
         self._walk = walk
-        self._columns: dict[str, list[np.ndarray]] = {}
+        self._steps: list[Log] = []
 
     @property
     def steps(self) -> int:
-        """Steps that it holds."""
-        return len(self._columns.get("k", ()))
+        """Number of recorded steps."""
+        return len(self._steps)
 
     def add(self) -> None:
-        """Takes in the step that ended."""
-        walk, driver, motion = self._walk, self._walk.driver, self._walk.world.motion
-        qpos, qvel = walk.world.state()
-        command, decision, n = walk.wanted, walk.decision, walk.world.n
-        nothing = np.zeros(n)
-        row = {
-            "qpos": qpos,
-            "qvel": qvel,
-            "torque": motion.joint_torque,
-            "contact": motion.contact,
-            "foot_position_w": motion.foot_position_w,
-            "clearance": motion.clearance,
-            "foot_height": np.zeros((n, 4)) if decision is None else decision.foot_height,
-            "k": nothing if decision is None else decision.k,
-            "threshold": nothing if decision is None else decision.threshold,
-            "gait": driver.gait.copy(),
-            "machine_state": driver.machine_state.copy(),
-            "stance_shown": driver.stance_shown(motion),
-            "fallen": walk.fallen.copy(),
-            "command": np.stack(
-                [command.forward_speed, command.yaw_rate, command.stride_frequency], axis=1
-            ),
-        }
-        if walk.config.values and (expected := driver.value()) is not None:
-            row["value"] = expected
-        for name, value in row.items():
-            kept = value.astype(_KEPT_AS[name]) if name in _KEPT_AS else value
-            self._columns.setdefault(name, []).append(kept)
+        """Records the step that ended."""
+        self._steps.append(_single(step_of(self._walk)))
 
     def log(self) -> Log:
-        """All of it; the recorder is empty then."""
-        world, driver = self._walk.world, self._walk.driver
-        terrain = world.terrains[0]
-        # One column after the other, each list given up at once: half of the memory.
-        columns = {name: np.stack(self._columns.pop(name)) for name in list(self._columns)}
-        return Log(
-            time=np.arange(1, len(columns["k"]) + 1) * CONTROL_PERIOD,
-            **columns,
-            gaits=driver.gaits,
-            robot=driver.robot.name,
-            terrain=terrain.name,
-            terrain_height=terrain.height,
-            terrain_size=np.array(terrain.size),
-            terrain_origin=np.array(terrain.origin),
-        )
+        """The log of all recorded steps; the recorder is empty afterwards."""
+        steps, self._steps = self._steps, []
+        return Log.stack(steps)
+
+
+def step_of(walk: Walk) -> Log:
+    """The last step of a walk, as an entry of a log."""
+    controller, world, decision = walk.controller, walk.world, walk.decision
+    terrain, nothing = world.terrains[0], np.zeros(world.n)
+    return Log(
+        sensed=walk.sensed,
+        truth=world.truth,
+        k=nothing if decision is None else decision.k,
+        threshold=nothing if decision is None else decision.threshold,
+        gait=controller.gait.copy(),
+        machine_state=controller.machine_state.copy(),
+        stance_shown=controller.repertoire.stance_shown(controller.gait, walk.sensed.contact),
+        fallen=walk.fallen.copy(),
+        gaits=controller.repertoire.gaits,
+        robot=controller.robot.name,
+        terrain=terrain.name,
+        terrain_height=terrain.height,
+        terrain_size=np.array(terrain.size),
+        terrain_origin=np.array(terrain.origin),
+    )
+
+
+def _single(log: Log) -> Log:
+    """A step with its proprioception and privileged state in single precision."""
+    return replace(log, sensed=log.sensed.as_type(np.float32), truth=log.truth.as_type(np.float32))

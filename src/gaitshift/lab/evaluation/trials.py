@@ -1,4 +1,4 @@
-"""The standard trials: what a shipped policy is put through, and the limits it is held against."""
+"""The standard trials of a shipped policy, and the limits of their figures."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,18 +17,19 @@ from gaitshift.lab.evaluation.evaluate import (
     field_length,
     run_policy,
 )
-from gaitshift.lab.gait_analysis import FIRST_GAITS, Check, checks
+from gaitshift.lab.gait_analysis import Check, checks
+from gaitshift.lab.gait_analysis.limits import FIRST, limits_of
 from gaitshift.lab.log import Log
 
 BATCH = 1_000_000
-"""Most control steps of all robots of a batch: its log takes about 330 MB."""
+"""Largest number of control steps of all robots in a batch: its log takes about 330 MB."""
 
 Report = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How much the trials ask of the machine."""
+    """Size of the trials."""
 
     pushed: int
     """Episodes on flat ground with pushes."""
@@ -37,7 +38,7 @@ class Size:
     seconds: float
     """Length of an episode [s]."""
     distance: float
-    """After which the lateral error is taken [m]."""
+    """Distance after which the lateral error is measured [m]."""
 
 
 SIZES = {
@@ -45,22 +46,22 @@ SIZES = {
     "short": Size(pushed=256, episodes=64, seconds=20.0, distance=50.0),
     "quick": Size(pushed=24, episodes=24, seconds=10.0, distance=5.0),
 }
-"""By their names on the command line; the quick ones are for a first look, and still long enough
-for robots to meet two steps or stairs."""
+"""Sizes by their names on the command line. The quick trials are for a first check, but long enough
+for robots to reach two steps or stairs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """A ground to survive or to keep the line on."""
+    """A ground, and the figure that is measured on it."""
 
     figure: Literal["survival", "lateral_error_p95"]
-    """Share of robots that never fall in an episode, told with the share of the asked distance that
-    they came; or the distance from their line [m] that 95 % of all robots keep when they have gone
-    the distance, those that never arrive counted beyond."""
+    """`survival`: share of robots that never fall in an episode, reported with the share of the
+    commanded distance that they walked. `lateral_error_p95`: 95th percentile over all robots of the
+    distance from their line [m] after `Size.distance`; robots that never arrive count as inf."""
     terrain: str
     """Spec of the ground."""
     piece: float | None = None
-    """Length of a piece that is laid out again and again [m]; None: one piece."""
+    """Length of a piece that is repeated [m]; None: one piece."""
     push: float = 0.0
     """Largest push on the base [N]."""
     first: float | None = None
@@ -69,7 +70,7 @@ class Trial:
     """Limit for every other gait."""
 
     def title(self, size: Size) -> str:
-        """One line for people, after the name of a figure."""
+        """One line that describes the trial, for the table."""
         if self.figure == "lateral_error_p95":
             return f"after {size.distance:g} m [m], {self.terrain}"
         pushes = f", pushes up to {self.push:g} N" if self.push else ""
@@ -77,10 +78,10 @@ class Trial:
 
     def limit(self, gait: str) -> float | None:
         """The limit of its figure for a gait."""
-        return self.first if gait in FIRST_GAITS else self.others
+        return self.first if limits_of(gait) is FIRST else self.others
 
     def spec(self, length: float) -> str:
-        """The ground at this length [m]: pieces in a row begin where robots have started level."""
+        """The spec of the ground at this length [m]; repeated pieces begin after level ground."""
         if self.piece is None:
             return self.terrain
         pieces = [f"{self.terrain}@{self.piece:g}"] * ceil(length / self.piece)
@@ -101,7 +102,7 @@ TRIALS = (
     Trial(figure="lateral_error_p95", terrain="flat", first=0.5, others=1.0),
     Trial(figure="lateral_error_p95", terrain="perlin:0.07", first=0.5, others=1.0),
 )
-"""Limits and grounds are ours. A piece of stairs goes ten steps up and down again."""
+"""Limits and grounds are ours. A piece of stairs has ten steps up and ten down."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,17 +110,17 @@ class Row:
     """One line of the table of trials."""
 
     trial: str
-    """What was tried."""
+    """Name of the figure and the trial."""
     value: float | None
-    """None: fewer robots than needed came to it."""
+    """None: too few robots for the figure."""
     bound: Literal["at_least", "at_most"]
-    """Which side of the limit is right."""
+    """Whether the limit is a lower or an upper bound."""
     limit: float | None
-    """None: the value is reported and held against nothing."""
+    """None: the value is reported without a limit."""
 
     @property
     def passed(self) -> bool | None:
-        """Whether the limit is kept; None without a limit."""
+        """Whether the limit is met; None without a limit."""
         if self.limit is None:
             return None
         if self.value is None:
@@ -142,9 +143,9 @@ def run_trials(
     seed: int = 0,
     report: Report = lambda done, total: None,
 ) -> tuple[list[Row], dict[str, Any], Log]:
-    """All trials of a policy: the table, the figures of its gait on flat ground, and that run.
+    """All trials of a policy: the table, the figures of its gait on flat ground, and that log.
 
-    `report` is called with the control steps done, of all robots, and those in all.
+    `report` is called with the number of control steps done, of all robots, and the total.
     """
     gait = EvaluationConfig(episodes=size.episodes, seconds=size.seconds, seed=seed)
     plan = [list(_batches(trial, policy, size, seed)) for trial in TRIALS]
@@ -169,13 +170,13 @@ def run_trials(
     rows.extend(
         Row(trial=_title_of(check), value=check.value, bound=check.bound, limit=check.limit)
         for check in checks(figures, policy.machine)
-        if check.figure != "survival"  # that of the trials counts
+        if check.figure != "survival"  # the trials measure it with more robots
     )
     return rows, figures, log
 
 
 def _batches(trial: Trial, policy: Policy, size: Size, seed: int) -> Iterator[EvaluationConfig]:
-    """The runs of a trial: each with a seed, and so with grounds, of its own."""
+    """The runs of a trial, each with its own seed and so its own grounds."""
     speed, seconds = policy.info.forward_speed, size.seconds
     if trial.figure == "lateral_error_p95":
         seconds = 2.0 + 1.5 * size.distance / speed  # for robots at two thirds of their speed
@@ -199,7 +200,7 @@ def _cost(config: EvaluationConfig) -> int:
 def _outcomes(
     trial: Trial, policy: Policy, config: EvaluationConfig, distance: float, report: Report
 ) -> dict[str, Float[np.ndarray, " N"]]:
-    """What each robot came to, figure by figure."""
+    """Each figure, for each robot."""
     if trial.figure == "lateral_error_p95":
         log = run_policy(policy, config, finish_x=distance, report=report)
         return {"lateral_error_p95": lateral_errors(log, distance)}
@@ -209,16 +210,16 @@ def _outcomes(
 
 
 def distances(log: Log) -> Float[np.ndarray, " N"]:
-    """How far along x each robot came before it fell or time was up [m]."""
+    """Distance along x of each robot until it fell or the run ended [m]."""
     last = np.maximum((~log.fallen).sum(axis=0) - 1, 0)
-    x = log.qpos[..., 0].astype(float)
+    x = log.truth.base_position_w[..., 0].astype(float)
     return np.take_along_axis(x, last[None], axis=0)[0] - x[0]
 
 
 def lateral_errors(log: Log, distance: float) -> Float[np.ndarray, " N"]:
-    """How far each robot is from its line when it has gone `distance` [m]; inf if it never has."""
-    there: Bool[np.ndarray, "T N"] = (log.qpos[..., 0] >= distance) & ~log.fallen
-    y = log.qpos[..., 1].astype(float)
+    """Distance of each robot from its line after `distance` [m]; inf if it never got there."""
+    there: Bool[np.ndarray, "T N"] = (log.truth.base_position_w[..., 0] >= distance) & ~log.fallen
+    y = log.truth.base_position_w[..., 1].astype(float)
     first = there.argmax(axis=0)[None]
     error = np.abs(np.take_along_axis(y, first, axis=0)[0] - y[0])
     return np.where(there.any(axis=0), error, np.inf)
@@ -237,7 +238,7 @@ def _row(
     limit = trial.limit(gait) if figure == trial.figure else None
     if figure != "lateral_error_p95":
         return Row(trial=title, value=float(outcomes.mean()), bound="at_least", limit=limit)
-    # "higher" takes a robot's own error, where interpolation with inf would give no number.
+    # "higher" takes the error of one robot; interpolation with inf gives NaN.
     value = float(np.quantile(outcomes, 0.95, method="higher"))
     kept = value if np.isfinite(value) else None
     return Row(trial=title, value=kept, bound="at_most", limit=limit)

@@ -4,7 +4,6 @@ from gaitshift.lab.gait_analysis.limits import FIRST_GAITS as FIRST_GAITS
 from gaitshift.lab.gait_analysis.limits import Limits as Limits
 from gaitshift.lab.gait_analysis.limits import limits_of as limits_of
 from gaitshift.lab.gait_analysis.measure import measure as measure
-from gaitshift.lab.gait_analysis.measure import robot_mass as robot_mass
 from gaitshift.lab.gait_analysis.naming import NONE as NONE
 from gaitshift.lab.gait_analysis.naming import gait_scores as gait_scores
 from gaitshift.lab.gait_analysis.naming import name_gait as name_gait

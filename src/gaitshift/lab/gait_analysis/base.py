@@ -1,12 +1,11 @@
 """Figures of the base and the joints: speed, heading, sway, effort."""
 
 import numpy as np
-from jaxtyping import Float
 
 from gaitshift.lab.gait_analysis.sample import Sample
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
-from gaitshift.robot.motion import GRAVITY
+from gaitshift.robot.description import Robot
+from gaitshift.robot.state import GRAVITY
 
 _SHORTEST_DRIFT = 0.5
 """Robots that fall sooner after the warm-up have no drift [s]."""
@@ -15,25 +14,27 @@ Figure = float | None
 """None: there was nothing to measure."""
 
 
-def base_figures(sample: Sample, mass: float) -> dict[str, Figure]:
-    """What `measure` says of base and joints, for robots of `mass` [kg]."""
+def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
+    """What `measure` says of base and joints, for robots of this kind."""
     log, alive = sample.log, sample.alive
     if sample.steps == 0:
         return dict.fromkeys(_NAMES)
-    speed, command = forward_speed(log)[alive], log.command[..., 0][alive]
+    sensed = log.sensed
+    command = sensed.need("forward_speed_command", "gait figures")[alive]
+    speed = log.truth.forward_speed[alive]
     mean = float(speed.mean(dtype=float))
-    joint_speed = log.qvel[..., 6:][alive]
-    power = np.abs(log.torque[alive] * joint_speed).sum(axis=-1)
-    turn = log.qvel[..., 3:5][alive]
-    too_fast = np.abs(joint_speed).max(axis=-1) > ROBOTS[log.robot].velocity_limit
-    height = (log.qpos[..., 2] - log.foot_position_w[..., 2].min(axis=-1))[alive]
+    joint_speed = sensed.need("joint_velocity", "gait figures")[alive]
+    power = sensed.power[alive]
+    turn = sensed.need("angular_velocity_b", "gait figures")[..., :2][alive]
+    too_fast = np.abs(joint_speed).max(axis=-1) > robot.velocity_limit
+    height = sensed.base_height[alive]
     values = (
         mean,
         abs(mean - float(command.mean())),
         float(np.sqrt(np.square(speed - command).mean())),
         _heading_drift(sample),
-        float(yaw(log)[alive].std()),
-        float(power.mean(dtype=float)) / (mass * GRAVITY * max(abs(mean), 1e-3)),
+        float(sensed.yaw[alive].std()),
+        float(power.mean(dtype=float)) / (robot.mass * GRAVITY * max(abs(mean), 1e-3)),
         mean**2 / (GRAVITY * max(float(np.median(height)), 1e-3)),
         float(turn[:, 0].std(dtype=float)),
         float(turn[:, 1].std(dtype=float)),
@@ -61,20 +62,14 @@ def lateral_error(log: Log) -> Figure:
     upright = ~log.fallen[-1]
     if not upright.any():
         return None
-    return float(np.quantile(np.abs(log.qpos[-1, upright, 1] - log.qpos[0, upright, 1]), 0.95))
-
-
-def forward_speed(log: Log) -> Float[np.ndarray, "T N"]:
-    """Base velocity along body x [m/s]."""
-    w, x, y, z = np.moveaxis(log.qpos[..., 3:7], -1, 0)
-    axis = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=-1)
-    return np.einsum("tni,tni->tn", axis, log.qvel[..., :3])
-
-
-def yaw(log: Log) -> Float[np.ndarray, "T N"]:
-    """Heading of the body's x axis about world z, in (-π, π] [rad]."""
-    w, x, y, z = np.moveaxis(log.qpos[..., 3:7], -1, 0)
-    return np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+    return float(
+        np.quantile(
+            np.abs(
+                log.truth.base_position_w[-1, upright, 1] - log.truth.base_position_w[0, upright, 1]
+            ),
+            0.95,
+        )
+    )
 
 
 def _heading_drift(sample: Sample) -> Figure:
@@ -87,8 +82,9 @@ def _heading_drift(sample: Sample) -> Figure:
     if long_enough.size == 0:
         return None
     end = last[long_enough]
-    heading = np.unwrap(yaw(sample.log)[:, long_enough].astype(float), axis=0)
+    heading = np.unwrap(sample.log.sensed.yaw[:, long_enough].astype(float), axis=0)
     turned = heading[end, np.arange(len(end))] - heading[0]
-    commanded = sample.log.command[:, long_enough, 1].cumsum(axis=0) * sample.period
+    asked_for = sample.log.sensed.need("yaw_rate_command", "gait figures")[:, long_enough]
+    commanded = asked_for.cumsum(axis=0) * sample.period
     asked = commanded[end, np.arange(len(end))] - commanded[0]
     return float(np.sqrt(np.square((turned - asked) / (end * sample.period)).mean()))

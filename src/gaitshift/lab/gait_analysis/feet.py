@@ -81,7 +81,7 @@ def _clearance(sample: Sample, leg: int) -> Figure:
     at = np.flatnonzero(sample.touchdowns[:, :, leg].T.ravel())
     if at.size < 2:
         return None
-    heights = np.where(sample.alive, sample.log.clearance[:, :, leg], -np.inf).T.ravel()
+    heights = np.where(sample.alive, sample.log.truth.clearance[:, :, leg], -np.inf).T.ravel()
     highest = np.maximum.reduceat(heights, at)[:-1]
     one_robot = np.diff(at // steps) == 0
     return float(np.median(highest[one_robot])) if one_robot.any() else None
@@ -89,7 +89,7 @@ def _clearance(sample: Sample, leg: int) -> Figure:
 
 def _slip(sample: Sample) -> Figure:
     """Mean horizontal speed of feet that are down in two steps running [m/s]."""
-    position = sample.log.foot_position_w[..., :2]
+    position = sample.log.truth.foot_position_w[..., :2]
     both = sample.contact[1:] & sample.contact[:-1]
     if not both.any():
         return None

@@ -1,5 +1,6 @@
 """What a gait has to reach to be called clean."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 
@@ -35,7 +36,7 @@ FIRST = Limits(
     duty_asymmetry=0.05,
     clearance=0.05,
 )
-"""Of `FIRST_GAITS`."""
+"""Of the paper's three gaits."""
 
 OTHERS = Limits(
     survival=0.99,
@@ -52,7 +53,10 @@ OTHERS = Limits(
 FIRST_GAITS = ("trot", "pace", "bound")
 """The paper's."""
 
+LIMITS: Mapping[str, Limits] = dict.fromkeys(FIRST_GAITS, FIRST)
+"""Gaits with limits of their own class."""
+
 
 def limits_of(gait: str) -> Limits:
     """The limits of a gait, by its name."""
-    return FIRST if gait in FIRST_GAITS else OTHERS
+    return LIMITS.get(gait, OTHERS)

@@ -10,11 +10,11 @@ from gaitshift.lab.gait_analysis.naming import gait_scores, name_gait
 from gaitshift.lab.gait_analysis.sample import WARM_UP, Sample
 from gaitshift.lab.gait_analysis.verdict import checks
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import Robot
 
 
 def measure(
-    log: Log, machines: Mapping[str, RewardMachine], *, mass: float, warm_up: float = WARM_UP
+    log: Log, machines: Mapping[str, RewardMachine], robot: Robot, *, warm_up: float = WARM_UP
 ) -> dict[str, Any]:
     """Figures of a log, over all robots while they are on their feet, after the warm-up.
 
@@ -48,13 +48,13 @@ def measure(
         log: the run; where it has several gaits, phases and verdict are those of the one that was
             in force for most of the time.
         machines: the machines of the gaits in it, by name.
-        mass: of the robot [kg].
+        robot: the robot of the log: its mass and the limit of its joints' speed count.
         warm_up: seconds left out.
     """
     sample = Sample.of(log, warm_up)
     figures: dict[str, Any] = {
         "survival": float(1.0 - log.fallen[-1].mean()),
-        **base_figures(sample, mass),
+        **base_figures(sample, robot),
         **feet_figures(sample, machines),
         "lateral_error_p95": lateral_error(log),
     }
@@ -69,10 +69,3 @@ def measure(
         "misses": misses,
     }
     return figures
-
-
-def robot_mass(name: str) -> float:
-    """Mass of a robot by its name [kg]."""
-    robot = ROBOTS[name]
-    model = robot.spec(robot.gains_of("default")).compile()
-    return float(model.body_mass.sum())

@@ -5,16 +5,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.lab.identification.grid import first_firings
-from gaitshift.lab.identification.recording import Recording, Way
-from gaitshift.shift import AnyStatistic, Condition, Rule, Signals, load_condition
-
-SHIPPED = "touchdown_surprise"
-"""The condition whose way back, or way there, stands in for the one that is not judged."""
+from gaitshift.lab.identification.firings import first_firings
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift import GaitGraph, Rule, load_graph, there_and_back, ways
+from gaitshift.shift.statistics import Watched
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Said:
+class RecordedValues:
     """A statistic whose numbers were known before, step by step: what it says forgets nothing."""
 
     values: Float[np.ndarray, "T N M"]
@@ -22,6 +21,7 @@ class Said:
 
     unit = ""
     needs = ()
+    search = None
 
     @property
     def width(self) -> int:
@@ -33,60 +33,58 @@ class Said:
         del n
         return 0
 
-    def step(self, state: int, signals: Signals) -> tuple[int, Float[np.ndarray, "N M"]]:
+    def step(self, state: int, sensed: Proprioception) -> tuple[int, Float[np.ndarray, "N M"]]:
         """The next step, and what was known of this one."""
-        del signals
+        del sensed
         return state + 1, self.values[state]
 
 
 def shipped_rule(*, back: bool) -> Rule:
-    """The shipped condition's rule of the way there or back."""
-    condition = load_condition(SHIPPED)
-    return condition.flat if back else condition.rough
+    """The default graph's rule of the way there or back: it stands in for what is not judged."""
+    return ways(load_graph())[back].rule
 
 
-def in_turn(rule: Rule, statistic: AnyStatistic, way: Way) -> Condition:
-    """A condition of this rule on this way, and of the shipped one's on the other."""
-    shipped = load_condition(SHIPPED)
+def in_turn(rule: Rule, statistic: Watched, way: Way) -> GaitGraph:
+    """A graph with this rule on this way, and the default graph's on the other."""
+    shipped = load_graph()
+    there, back = ways(shipped)
     if way == "rough":
-        return replace(
-            shipped,
-            statistic=statistic,
-            statistic_back=shipped.statistic_back or shipped.statistic,
-            alpha=rule.alpha,
-            beta=rule.beta,
-            leak=rule.leak,
+        return there_and_back(
+            statistic,
+            replace(there.rule, alpha=rule.alpha, beta=rule.beta, leak=rule.leak),
+            back.rule,
+            statistic_back=shipped.statistics[back.statistic],
         )
-    return replace(
-        shipped,
+    return there_and_back(
+        shipped.statistics[there.statistic],
+        there.rule,
+        replace(back.rule, alpha=rule.alpha, beta=rule.beta, leak=rule.leak),
         statistic_back=statistic,
-        alpha_back=rule.alpha,
-        beta_back=rule.beta,
-        leak_back=rule.leak,
     )
 
 
-def shifts(recording: Recording, condition: Condition) -> Int[np.ndarray, " N"]:
+def shifts(recording: LabelledRun, graph: GaitGraph) -> Int[np.ndarray, " N"]:
     """How often each robot would have shifted, there and back taken together.
 
     All begin in the gait for flat ground. A robot that has fallen shifts no more.
     """
     n = recording.robots
-    state, count = condition.start(n), np.zeros(n, dtype=np.int64)
-    for alive, signals in zip(recording.alive, recording, strict=True):
-        state, fires = condition.step(state, signals, count % 2 == 1)
-        count += fires & alive
+    state, count = graph.begin(n), np.zeros(n, dtype=np.int64)
+    for alive, sensed, rough in zip(recording.alive, recording, recording.rough, strict=True):
+        before = replace(state, gait=count % 2)
+        state, decision = graph.step(before, sensed, rough)
+        count += decision.fired & alive
     return count
 
 
-def ever_fires(recording: Recording, rule: Rule, values: Float[np.ndarray, "T N M"]) -> bool:
+def ever_fires(recording: LabelledRun, rule: Rule, values: Float[np.ndarray, "T N M"]) -> bool:
     """Whether any robot fires a rule: where none does on the way there, none ever shifts."""
     alpha, beta = np.array([rule.alpha]), np.array([rule.beta])
     first = first_firings(values, recording.alive, rule, alpha, beta)
     return bool((first < len(recording.time)).any())
 
 
-def chattered(recording: Recording, count: Int[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
+def chattered(recording: LabelledRun, count: Int[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
     """Whether each robot shifted more than once there and once back for each rough stretch.
 
     Once there and once back is nobody's chatter, even where no ground was rough: it is a false

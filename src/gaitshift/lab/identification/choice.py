@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.tally import Grid, Tally
+from gaitshift.lab.identification.firings import ParameterGrid, Tally
 
 HEADROOM = 1.25
 """No false shift on the recordings of the choice even at a β smaller by this factor; ours: what is
@@ -43,7 +43,7 @@ class Choice:
 
 def choose(
     tallies: Mapping[float, Mapping[str, Tally]],
-    grid: Grid,
+    grid: ParameterGrid,
     when: Literal["above", "below"] = "above",
 ) -> Choice:
     """The soonest detection of rough ground among the settings that never shift on smooth ground.
@@ -63,7 +63,9 @@ def choose(
     return min(choices, key=lambda c: (not c.is_free, 0 if c.is_free else c.false_per_km, c.cost_m))
 
 
-def _best(leak: float, tally: Tally, grid: Grid, when: Literal["above", "below"]) -> Choice:
+def _best(
+    leak: float, tally: Tally, grid: ParameterGrid, when: Literal["above", "below"]
+) -> Choice:
     back = when == "below"
     if not tally.came.any():
         ground = "rough ground that ends" if back else "rough ground"
@@ -105,7 +107,7 @@ def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
     return np.where(tally.came > 0, total / np.maximum(tally.came, 1), np.inf)
 
 
-def _free(tally: Tally, grid: Grid, when: Literal["above", "below"]) -> np.ndarray:
+def _free(tally: Tally, grid: ParameterGrid, when: Literal["above", "below"]) -> np.ndarray:
     """Where nobody fired on smooth ground, nor at a β that much smaller and an α as much nearer."""
     clean = tally.fired == 0
     if when == "above":

@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.candidates import Candidate
-from gaitshift.lab.identification.recording import Recording
+from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.shift import (
     AnyStatistic,
     AttitudeVariance,
@@ -62,7 +62,7 @@ class RoughnessClassifier:
     """Which of them learned from the first robot of each recording; they take turns from there."""
 
     @classmethod
-    def fit(cls, recordings: Iterable[Recording]) -> "RoughnessClassifier":
+    def fit(cls, recordings: Iterable[LabelledRun]) -> "RoughnessClassifier":
         """Learns rough from smooth ground.
 
         Raises:
@@ -93,7 +93,7 @@ class RoughnessClassifier:
         )
         return cls(statistics=statistics, models=cast(Any, models), halves=halves)
 
-    def probability(self, recording: Recording, *, crosswise: bool) -> Float[np.ndarray, "T N 1"]:
+    def probability(self, recording: LabelledRun, *, crosswise: bool) -> Float[np.ndarray, "T N 1"]:
         """How likely the ground is rough, by both models, or by the one that never saw the robot.
 
         `crosswise` is for the very recordings that it was fitted on.
@@ -120,18 +120,20 @@ class RoughnessClassifier:
         )
 
 
-def _fed_by(recording: Recording) -> tuple[AnyStatistic, ...]:
+def _fed_by(recording: LabelledRun) -> tuple[AnyStatistic, ...]:
     return tuple(
-        s for s in _STATISTICS if all(getattr(recording, name) is not None for name in s.needs)
+        s
+        for s in _STATISTICS
+        if all(getattr(recording.sensed, name) is not None for name in s.needs)
     )
 
 
-def _key(recording: Recording) -> int:
-    return crc32(recording.foot_position_b.tobytes())
+def _key(recording: LabelledRun) -> int:
+    return crc32(recording.sensed.foot_position_b.tobytes())
 
 
 def _features(
-    recording: Recording, statistics: tuple[AnyStatistic, ...]
+    recording: LabelledRun, statistics: tuple[AnyStatistic, ...]
 ) -> Float[np.ndarray, "S N F"]:
     """What the classifier sees, at each fifth step; NaN where nothing is known yet."""
     columns: list[np.ndarray] = []

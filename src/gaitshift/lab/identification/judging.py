@@ -7,14 +7,24 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.chatter import Said, chattered, ever_fires, in_turn, shifts
-from gaitshift.lab.identification.facing import facing
-from gaitshift.lab.identification.grid import first_firings, steps_alive
+from gaitshift.lab.identification.chatter import (
+    RecordedValues,
+    chattered,
+    ever_fires,
+    in_turn,
+    shifts,
+)
+from gaitshift.lab.identification.firings import (
+    Tally,
+    detections,
+    first_firings,
+    join_by_name,
+    steps_alive,
+)
+from gaitshift.lab.identification.ground import align_to_entry
+from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.lab.identification.passage import longest_passage, passage_scores
-from gaitshift.lab.identification.recording import Recording
-from gaitshift.lab.identification.scores import detections
 from gaitshift.lab.identification.statistics import auc, auc_interval
-from gaitshift.lab.identification.tally import Tally, join_by_name
 from gaitshift.lab.identification.tuning import Tuned
 
 
@@ -110,7 +120,7 @@ class Judged:
         return np.array([float(x) for course in self.courses for x in course.scores[False]])
 
 
-def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[Recording]) -> Replayed:
+def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[LabelledRun]) -> Replayed:
     """Replays each condition with its numbers, course by course.
 
     Raises:
@@ -129,13 +139,13 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[Recording]) -> Rep
                     f"{', '.join(missing)}"
                 )
             values = one.candidate.values(recording)
-            seen, faced = facing(recording, values, one.way)
+            seen, aligned = align_to_entry(recording, values, one.way)
             course = replayed.courses[name].setdefault(
                 seen.name, OnCourse(course=seen.name, tally=Tally(shape=(1, 1)))
             )
-            _add(course, one, seen, faced)
+            _add(course, one, seen, aligned)
             if one.way == "flat" or ever_fires(recording, rule, values):
-                watched = one.candidate.statistic or Said(values=values)
+                watched = one.candidate.statistic or RecordedValues(values=values)
                 count = shifts(recording, in_turn(rule, watched, one.way))
                 course.shifts += int(count.sum())
                 course.chattered += int(chattered(recording, count).sum())
@@ -167,8 +177,10 @@ def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
     ]
 
 
-def _add(course: OnCourse, one: Tuned, seen: Recording, values: Float[np.ndarray, "T N M"]) -> None:
-    """Takes in how a condition did on a recording that shows what it is to notice (`facing`)."""
+def _add(
+    course: OnCourse, one: Tuned, seen: LabelledRun, values: Float[np.ndarray, "T N M"]
+) -> None:
+    """Adds what a condition did on a recording from `align_to_entry`."""
     alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
     first = first_firings(values, seen.alive, one.rule, alpha, beta)
     course.tally.add(seen, first)

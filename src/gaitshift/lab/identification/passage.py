@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.lab.identification.grid import counters, steps_alive
-from gaitshift.lab.identification.recording import Recording
+from gaitshift.lab.identification.firings import counters, steps_alive
+from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.lab.identification.statistics import auc
 from gaitshift.shift import Rule
 
@@ -19,7 +19,7 @@ GridScores = dict[bool, list[Int[np.ndarray, " B"]]]
 
 
 def passage_scores(
-    recording: Recording,
+    recording: LabelledRun,
     values: Float[np.ndarray, "T N M"],
     rule: Rule,
     alphas: Float[np.ndarray, " A"],
@@ -34,7 +34,7 @@ def passage_scores(
 
 
 def passage_grid(
-    recording: Recording,
+    recording: LabelledRun,
     values: Float[np.ndarray, "T N M"],
     rule: Rule,
     alphas: Float[np.ndarray, " A"],
@@ -73,12 +73,12 @@ def best_beta(
     return chosen if area[own] >= area[best] else float(betas[best])
 
 
-def longest_passage(recording: Recording) -> int:
+def longest_passage(recording: LabelledRun) -> int:
     """Steps of the longest passage; 0 where there is none."""
     return max((end - start for _, start, end in _passages(recording)), default=0)
 
 
-def _passages(recording: Recording) -> Iterator[tuple[int, int, int]]:
+def _passages(recording: LabelledRun) -> Iterator[tuple[int, int, int]]:
     """Robot, first step, and the step after the last, of each passage."""
     ends = steps_alive(recording.alive)
     for robot in range(recording.robots):

@@ -1,22 +1,20 @@
 """The report of an identification: README.md and two small tables."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from gaitshift.lab.identification.chatter import SHIPPED, shipped_rule
+from gaitshift import table
+from gaitshift.lab.identification.chatter import shipped_rule
 from gaitshift.lab.identification.choice import Choice
 from gaitshift.lab.identification.judging import Judged, OnCourse
 from gaitshift.lab.identification.passage import LENGTH
 from gaitshift.lab.identification.statistics import poisson, wilson
 from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.table import Row
 
 README, CONDITIONS, COURSES = FILES = ("README.md", "conditions.csv", "courses.csv")
-
-Row = dict[str, Any]
 
 _TITLES = {"rough": "When rough ground begins", "flat": "When rough ground ends"}
 
@@ -50,10 +48,7 @@ def write_report(
     """
     conditions, courses = condition_rows(judged), course_rows(judged)
     for name, rows in ((CONDITIONS, conditions), (COURSES, courses)):
-        with (out / name).open("w", newline="") as file:
-            lines = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            lines.writeheader()
-            lines.writerows(rows)
+        table.write(out / name, rows)
     (out / README).write_text(_readme(judged, conditions, courses, command, held_out, pictures))
     return conditions
 
@@ -90,8 +85,8 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
         "β [m] are the shortest time until k exceeds β, with all values beyond α, and the distance "
         f"at the mean speed. Area is that under the ROC curve of passages of {LENGTH:g} m on the "
         f"hardest course, at {_area_words(tuned.choice)}. Chattered counts the robots with more "
-        "than one shift there and one back for each rough stretch, with the shipped rule for the "
-        f"way {other} ({SHIPPED}: α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak "
+        "than one shift there and one back for each rough stretch, with the default graph's rule "
+        f"for the way {other} (α {stand_in.alpha:g} m, β {stand_in.beta:g}, leak "
         f"{stand_in.leak:g}). Robots kept the gait of the logs. Intervals are 95 %."
     )
 
@@ -189,7 +184,7 @@ def _readme(
         f"Made by `{command}`. The same as an [interactive page](page.html).",
         "## All conditions",
     ]
-    parts.append(_table(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
+    parts.append(table.markdown(CONDITIONS_HEAD, [condition_cells(row) for row in conditions]))
     parts += [
         f"No setting of {one.tuned.candidate.name} is free of false shifts on the logs for "
         "choosing; the setting with the fewest false shifts per kilometre is shown."
@@ -201,7 +196,7 @@ def _readme(
         name = one.tuned.candidate.name
         parts += [f"## {name}", one.tuned.candidate.note.capitalize() + "."]
         of = [row for row in courses if row["condition"] == name]
-        parts.append(_table(COURSES_HEAD, [course_cells(row) for row in of]))
+        parts.append(table.markdown(COURSES_HEAD, [course_cells(row) for row in of]))
     return "\n\n".join(parts) + "\n"
 
 
@@ -254,11 +249,6 @@ def course_cells(row: Row) -> tuple[str, ...]:
         else f"{row['area']:.4f} ({row['area_low']:.3f} to {row['area_high']:.3f})",
         "" if row["area_beta"] is None else f"{row['area_beta']:g}",
     )
-
-
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _number(value: float | None, digits: int) -> str:

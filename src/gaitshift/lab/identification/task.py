@@ -9,9 +9,9 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.candidates import CANDIDATES, Candidate, candidates
 from gaitshift.lab.identification.classifier import NAME, RoughnessClassifier
 from gaitshift.lab.identification.judging import Judged, Replayed, judge, replay_rules
-from gaitshift.lab.identification.kept import Kept, Stamp, stamp
-from gaitshift.lab.identification.recording import Way
-from gaitshift.lab.identification.sources import check_sources, recordings
+from gaitshift.lab.identification.labelled_run import Way
+from gaitshift.lab.identification.log_files import check_sources, recordings
+from gaitshift.lab.identification.step_cache import Stamp, StepCache, stamp
 from gaitshift.lab.identification.tuning import Tried, Tuned, as_given, try_grids, tune
 
 ALL = "all"
@@ -83,12 +83,12 @@ class Task:
             GaitshiftError: a log cannot be read, lacks the signals of a condition that was named,
                 or all of them are of one kind of ground.
         """
-        kept = Kept(folder, report)
+        cache = StepCache(folder, report)
         learned = tuple(map(stamp, self.logs))
-        classifier = self._fitted(kept, learned, report)
+        classifier = self._fitted(cache, learned, report)
         if classifier is None:
             learned = ()
-        tuned = self._tuned(kept, classifier, learned)
+        tuned = self._tuned(cache, classifier, learned)
         if classifier is not None:  # robots that judge were seen by neither half of it
             known = classifier.candidate(crosswise=False)
             tuned = [replace(t, candidate=known) if t.candidate.name == NAME else t for t in tuned]
@@ -97,18 +97,18 @@ class Task:
         for log in self.judges:
             work = partial(_replay, tuned, log, self.way)
             about = (self.way, rules, learned, stamp(log))
-            replayed.join(kept.get(f"judging: {log.stem}", about, work))
+            replayed.join(cache.get(f"judging: {log.stem}", about, work))
         return judge(tuned, replayed)
 
     def _fitted(
-        self, kept: Kept, learned: tuple[Stamp, ...], report: Callable[[str], None]
+        self, cache: StepCache, learned: tuple[Stamp, ...], report: Callable[[str], None]
     ) -> RoughnessClassifier | None:
         """The classifier, where it is asked for and can learn."""
         if not self.everything and NAME not in self.conditions:
             return None
         work = partial(_fit, self.logs, self.way)
         try:
-            return kept.get("fitting the classifier", (self.way, learned), work)
+            return cache.get("fitting the classifier", (self.way, learned), work)
         except GaitshiftError as error:
             if not self.everything:
                 raise
@@ -116,7 +116,7 @@ class Task:
             return None
 
     def _tuned(
-        self, kept: Kept, classifier: RoughnessClassifier | None, learned: tuple[Stamp, ...]
+        self, cache: StepCache, classifier: RoughnessClassifier | None, learned: tuple[Stamp, ...]
     ) -> list[Tuned]:
         wanted = list(self.wanted)
         if classifier is not None:
@@ -128,7 +128,7 @@ class Task:
         for log in self.logs:
             work = partial(_try, wanted, log, self.way)
             about = (self.way, names, learned, stamp(log))
-            tried.join(kept.get(f"choosing: {log.stem}", about, work))
+            tried.join(cache.get(f"choosing: {log.stem}", about, work))
         tuned = tune(wanted, tried)
         found = {one.candidate.name for one in tuned}
         left_out = [name for name in names if name not in found]

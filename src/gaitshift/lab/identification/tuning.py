@@ -6,11 +6,10 @@ from dataclasses import dataclass, field, replace
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.candidates import BETAS, Candidate
 from gaitshift.lab.identification.choice import Choice, choose
-from gaitshift.lab.identification.facing import facing
-from gaitshift.lab.identification.grid import first_firings
+from gaitshift.lab.identification.firings import ParameterGrid, Tally, first_firings, join_by_name
+from gaitshift.lab.identification.ground import align_to_entry
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way
 from gaitshift.lab.identification.passage import GridScores, best_beta, passage_grid
-from gaitshift.lab.identification.recording import Recording, Way
-from gaitshift.lab.identification.tally import Grid, Tally, join_by_name
 from gaitshift.shift import Rule
 
 
@@ -24,7 +23,7 @@ class Tuned:
     """What it is to notice."""
     choice: Choice
     """α, β and leak."""
-    grid: Grid
+    grid: ParameterGrid
     """What was tried."""
     tally: Tally
     """What came of it over the recordings that chose, at the chosen leak."""
@@ -85,7 +84,9 @@ class Tried:
                 join_by_name(self.found.setdefault(name, {}).setdefault(leak, {}), by_course)
 
 
-def try_grids(candidates: Sequence[Candidate], recordings: Iterable[Recording], way: Way) -> Tried:
+def try_grids(
+    candidates: Sequence[Candidate], recordings: Iterable[LabelledRun], way: Way
+) -> Tried:
     """Replays each candidate that a recording feeds, at each α, β and leak that it is tried at."""
     tried = Tried(way=way)
     for recording in recordings:
@@ -94,7 +95,7 @@ def try_grids(candidates: Sequence[Candidate], recordings: Iterable[Recording], 
                 tried.lacking[candidate.name] = missing
                 continue
             values = candidate.values(recording)  # an oracle sees the ground as it is
-            seen, values = facing(recording, values, way)
+            seen, values = align_to_entry(recording, values, way)
             grid = _grid(candidate, way)
             for leak in candidate.leaks:
                 rule = _rule(way, 1.0, 1.0, leak)
@@ -173,8 +174,8 @@ def as_given(
     ]
 
 
-def _grid(candidate: Candidate, way: Way) -> Grid:
-    return Grid(alphas=candidate.alphas(way), betas=BETAS)
+def _grid(candidate: Candidate, way: Way) -> ParameterGrid:
+    return ParameterGrid(alphas=candidate.alphas(way), betas=BETAS)
 
 
 def _rule(way: Way, alpha: float, beta: float, leak: float) -> Rule:

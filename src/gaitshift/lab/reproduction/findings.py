@@ -6,14 +6,14 @@ from typing import Literal
 
 import numpy as np
 
-from gaitshift.lab.reproduction.landmarks import (
+from gaitshift.lab.reproduction.plan import (
+    ABLATED,
     GAITS,
     LEARNED_BY,
     PLATEAU,
     START,
     ZERO_CROSSING,
 )
-from gaitshift.lab.reproduction.plan import ABLATED
 from gaitshift.lab.reproduction.results import Results, Seeds
 from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER
 
@@ -58,12 +58,12 @@ def findings(results: Results) -> list[Finding]:
                 continue
             others = [ablations[s.name] for s in settings]
             labels = [AS_IN_THE_PAPER[group], *(s.label for s in settings)]
-            told = [_told(*pair) for pair in zip(labels, [reference, *others], strict=True)]
+            parts = [_describe(*pair) for pair in zip(labels, [reference, *others], strict=True)]
             found.append(
                 Finding(
                     name=group,
                     paper=paper,
-                    measured=f"{ABLATED.capitalize()}. {'. '.join(told)}.",
+                    measured=f"{ABLATED.capitalize()}. {'. '.join(parts)}.",
                     verdict=judge(reference, ablations[deciding]),
                 )
             )
@@ -71,7 +71,7 @@ def findings(results: Results) -> list[Finding]:
 
 
 def _all_come_out(gaits: dict[str, Seeds]) -> Finding:
-    told = [
+    parts = [
         f"{gait} in {seeds.walking} of {len(seeds)} seeds ({_number(seeds.late('speed'), '.2f')}"
         f" m/s, reward {_number(seeds.late('reward'), '.1f')} per step)"
         for gait, seeds in gaits.items()
@@ -80,13 +80,13 @@ def _all_come_out(gaits: dict[str, Seeds]) -> Finding:
     return Finding(
         name="three gaits",
         paper="All three gaits are learned in about 500 iterations (IV-B).",
-        measured=f"Runs that walk at the end: {', '.join(told)}.",
+        measured=f"Runs that walk at the end: {', '.join(parts)}.",
         verdict=_grade(walking, sum(map(len, gaits.values()))),
     )
 
 
 def _learned_early(gaits: dict[str, Seeds]) -> Finding:
-    starts = [course.walks_at for seeds in gaits.values() for course in seeds.courses]
+    starts = [curve.walks_at for seeds in gaits.values() for curve in seeds.curves]
     early = sum(start is not None and start <= LEARNED_BY for start in starts)
     verdict: Verdict = "does not hold" if early == 0 else "holds in part"
     return Finding(
@@ -99,23 +99,23 @@ def _learned_early(gaits: dict[str, Seeds]) -> Finding:
 
 def _order(gaits: dict[str, Seeds]) -> Finding:
     first = [_or_never(gaits[gait].walk_from) for gait in GAITS]
-    told = [f"{gait} {_iteration(gaits[gait].walk_from)}" for gait in GAITS]
+    parts = [f"{gait} {_iteration(gaits[gait].walk_from)}" for gait in GAITS]
     in_order = [a < b for a, b in pairwise(first)]
     return Finding(
         name="order",
         paper="Trot is learned first, then bound, then pace (IV-B).",
-        measured=f"Iteration from which the median run walks: {', '.join(told)}.",
+        measured=f"Iteration from which the median run walks: {', '.join(parts)}.",
         verdict=_grade(sum(in_order), len(in_order)),
     )
 
 
 def _curves(gaits: dict[str, Seeds]) -> Finding:
-    told: list[str] = []
+    parts: list[str] = []
     near: list[bool] = []
     for gait, seeds in gaits.items():
-        start = float(np.mean([c.reward[0] for c in seeds.courses if len(c)] or [np.nan]))
+        start = float(np.mean([c.reward[0] for c in seeds.curves if len(c)] or [np.nan]))
         late, crossing = seeds.late("reward"), seeds.cross_zero_at
-        told.append(
+        parts.append(
             f"{gait} starts at {start:.0f}, is positive from iteration {_iteration(crossing)}"
             f" (paper: {ZERO_CROSSING[gait]}) and ends at {_number(late, '.1f')}"
         )
@@ -126,7 +126,7 @@ def _curves(gaits: dict[str, Seeds]) -> Finding:
             late is not None and low <= late <= high,
             1 / CROSSING_WITHIN <= ratio <= CROSSING_WITHIN,
         ]
-    text = "; ".join(told)
+    text = "; ".join(parts)
     return Finding(
         name="reward curves",
         paper=(
@@ -208,7 +208,7 @@ _COMPARISONS = {
 that setting."""
 
 
-def _told(label: str, seeds: Seeds) -> str:
+def _describe(label: str, seeds: Seeds) -> str:
     """How many walk, how many are as fast in any gait, and from when, by the median."""
     text = (
         f"**{label}** {seeds.walking} of {len(seeds)} walk "

@@ -9,8 +9,7 @@ from statistics import fmean
 from gaitshift.control import policy
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
 from gaitshift.lab.log import Log
-from gaitshift.lab.reproduction.results import Results
-from gaitshift.lab.reproduction.told import Told
+from gaitshift.lab.reproduction.results import EarlierRuns, Results
 from gaitshift.learn.run import POLICY
 
 FIGURES = (
@@ -21,11 +20,11 @@ FIGURES = (
     "touchdowns_per_cycle",
     "cost_of_transport",
 )
-"""What is told of each policy; touchdowns are the mean over the feet (1: a clean cycle)."""
+"""Figures of each policy; touchdowns are the mean over the feet (1: a clean cycle)."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Judged:
+class JudgedPolicy:
     """One policy, and how it walked."""
 
     gait: str
@@ -35,7 +34,7 @@ class Judged:
     walks_at: int | None
     """Iteration of its training from which it walked."""
     figures: Mapping[str, float | None]
-    """`FIGURES` by name; None what cannot be told of a robot that fell at once."""
+    """`FIGURES` by name; None where a robot fell at once."""
     log: Log | None
     """The walk itself; None of a policy that an earlier report judged."""
 
@@ -43,12 +42,12 @@ class Judged:
 def judge(
     results: Results,
     runs: Path,
-    told: Told,
+    earlier: EarlierRuns,
     report: Callable[[int, int], None] = lambda done, total: None,
-) -> list[Judged]:
-    """Lets every policy of the paper's setting walk on flat ground, but for those told of."""
+) -> list[JudgedPolicy]:
+    """Evaluates the policies of the paper's setting on flat ground, less those of earlier runs."""
     wanted = list(_policies(results))
-    judged: list[Judged] = []
+    judged: list[JudgedPolicy] = []
     plan = results.plan
     config = EvaluationConfig(episodes=plan.robots, seconds=plan.seconds, seed=plan.seed)
     for gait, seed, walks_at, name in wanted:
@@ -57,13 +56,15 @@ def judge(
             measured, log = evaluate(policy.load(path), config)
             figures: Mapping[str, float | None] = {key: _one(measured[key]) for key in FIGURES}
         else:
-            figures = told.figures.get(name, dict.fromkeys(FIGURES))
-        judged.append(Judged(gait=gait, seed=seed, walks_at=walks_at, figures=figures, log=log))
+            figures = earlier.figures.get(name, dict.fromkeys(FIGURES))
+        judged.append(
+            JudgedPolicy(gait=gait, seed=seed, walks_at=walks_at, figures=figures, log=log)
+        )
         report(len(judged), len(wanted))
     return judged
 
 
-def middle(judged: list[Judged], gait: str) -> Judged | None:
+def middle(judged: list[JudgedPolicy], gait: str) -> JudgedPolicy | None:
     """The policy of a gait that shows its pattern neither most nor least."""
     ordered = sorted(
         (one for one in judged if one.gait == gait),
@@ -74,9 +75,9 @@ def middle(judged: list[Judged], gait: str) -> Judged | None:
 
 def _policies(results: Results) -> Iterator[tuple[str, int, int | None, str]]:
     for gait, seeds in results.gaits():
-        for job, course, broken in zip(seeds.jobs, seeds.courses, seeds.broken, strict=True):
+        for job, curve, broken in zip(seeds.jobs, seeds.curves, seeds.broken, strict=True):
             if not broken:
-                yield gait, job.seed, course.walks_at, job.name
+                yield gait, job.seed, curve.walks_at, job.name
 
 
 def _one(value: float | list[float] | None) -> float | None:

@@ -1,12 +1,27 @@
-"""Which runs there are: settings × gaits × seeds, and which of them are wanted."""
+"""What is trained: the gaits and landmarks of the paper, and the jobs of the plan."""
 
 from dataclasses import dataclass, replace
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
-from gaitshift.lab.reproduction.landmarks import GAITS
 from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
 from gaitshift.learn.recipe import Recipe
+
+GAITS = ("trot", "bound", "pace")
+"""The paper's gaits, in the order in which it learns them (IV-B)."""
+
+START = -25.0
+"""Reward a control step at the first iteration, of all gaits; read off Fig. 1."""
+
+PLATEAU = (25.0, 27.0)
+"""Reward a control step that the curves end at; read off Fig. 1."""
+
+ZERO_CROSSING = {"trot": 38, "bound": 52, "pace": 85}
+"""Iteration at which each curve crosses zero; read off Fig. 1."""
+
+LEARNED_BY = 100
+"""Iteration by which a robot moves in the right way in most cases (IV-B)."""
+
 
 ABLATED = "trot"
 """The gait that ablations are made with: the one that the paper learns first."""

@@ -1,23 +1,118 @@
-"""The runs of a plan as they lie in their folders: courses by setting and gait."""
+"""The runs of a plan that are over, in their folders or in the tables of an earlier report."""
 
+import hashlib
+import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from statistics import fmean
 
-from gaitshift.lab.reproduction.courses import (
+from gaitshift import table
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.reproduction.learning_curve import (
     WALKING_CHANGES,
     WALKING_SPEED,
-    Course,
+    LearningCurve,
     median_iteration,
 )
-from gaitshift.lab.reproduction.landmarks import GAITS
-from gaitshift.lab.reproduction.plan import ABLATED, Job, Plan
+from gaitshift.lab.reproduction.plan import ABLATED, GAITS, Job, Plan
 from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER
-from gaitshift.lab.reproduction.told import Told
 from gaitshift.lab.reproduction.training import FAILED, is_over
 from gaitshift.learn.run import PROGRESS
+
+RUNS_FILE, CURVES_FILE, GAITS_FILE = "runs.csv", "curves.csv", "gaits.csv"
+
+KEY = ("setting", "gait", "seed")
+"""What tells the runs of a plan apart, the first columns of each of the tables."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EarlierRuns:
+    """Runs that are over, by the name of their job; their folders may be gone."""
+
+    curves: Mapping[str, LearningCurve] = field(default_factory=dict[str, LearningCurve])
+    """What each iteration was like."""
+    broken: frozenset[str] = frozenset()
+    """Those that broke down in their own numbers."""
+    figures: Mapping[str, Mapping[str, float | None]] = field(
+        default_factory=dict[str, Mapping[str, float | None]]
+    )
+    """How their policies walked, as far as they were judged."""
+
+    @classmethod
+    def read(cls, plan: Plan, out: Path) -> "EarlierRuns":
+        """The runs of a plan in the report in `out`; none where there is no report.
+
+        Raises:
+            GaitshiftError: a damaged table, or runs of other numbers than the plan's.
+        """
+        if not (out / RUNS_FILE).is_file():
+            return cls()
+        jobs: dict[tuple[str, ...], Job] = {
+            (job.setting.name, job.gait, str(job.seed)): job for job in plan.jobs
+        }
+        names, broken = dict[tuple[str, ...], str](), set[str]()
+        for key, row in _rows(out / RUNS_FILE):
+            if key not in jobs:
+                continue
+            job = jobs[key]
+            if row.get("recipe") != fingerprint(job):
+                raise GaitshiftError(
+                    f"{out / RUNS_FILE} has {job.name} with another recipe; give another --out, or "
+                    "leave out --add to train it again"
+                )
+            names[key] = job.name
+            if row.get("broke_down") == "True":
+                broken.add(job.name)
+        curves = {name: LearningCurve.empty() for name in broken}
+        for key, rows in groupby(_rows(out / CURVES_FILE), lambda pair: pair[0]):
+            if key in names:
+                try:
+                    curves[names[key]] = LearningCurve.of([row for _, row in rows])
+                except (KeyError, ValueError) as error:
+                    raise GaitshiftError(f"{out / CURVES_FILE} is damaged: {error}") from error
+        for key, name in names.items():
+            whole = jobs[key].recipe.iterations
+            if name not in broken and len(curves.get(name, ())) != whole:
+                raise GaitshiftError(
+                    f"{out / CURVES_FILE} must have {whole} lines of {name}, got "
+                    f"{len(curves.get(name, ()))}"
+                )
+        judged = dict(_rows(out / GAITS_FILE)) if (out / GAITS_FILE).is_file() else {}
+        return cls(
+            curves=curves,
+            broken=frozenset(broken),
+            figures={
+                name: _numbers(judged[key], f"{out / GAITS_FILE}, {name}")
+                for key, name in names.items()
+                if key in judged
+            },
+        )
+
+
+def fingerprint(job: Job) -> str:
+    """Of all that decides what a run does but its seed."""
+    numbers = {"machine": job.machine.to_dict(), "recipe": asdict(job.recipe)}
+    return hashlib.sha256(json.dumps(numbers, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def _rows(path: Path) -> list[tuple[tuple[str, ...], dict[str, str]]]:
+    """The lines of a table after the runs that they are of."""
+    try:
+        return [(tuple(row[name] for name in KEY), row) for row in table.read(path)]
+    except KeyError as error:
+        raise GaitshiftError(f"{path} is damaged: {error}") from error
+
+
+def _numbers(row: Mapping[str, str], where: str) -> dict[str, float | None]:
+    """The numbers of a row; None for an empty cell."""
+    names = [name for name in row if name not in (*KEY, "walks_from_iteration")]
+    try:
+        return {name: float(row[name]) if row[name] else None for name in names}
+    except ValueError as error:
+        raise GaitshiftError(f"{where} is damaged: {error}") from error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +121,7 @@ class Seeds:
 
     jobs: tuple[Job, ...]
     """Those that are over."""
-    courses: tuple[Course, ...]
+    curves: tuple[LearningCurve, ...]
     """One a job; a run that broke down has a short one, an empty one perhaps."""
     broken: tuple[bool, ...]
     """Which of them broke down in their own numbers."""
@@ -36,45 +131,45 @@ class Seeds:
 
     def cut(self, iterations: int, seeds: int) -> "Seeds":
         """The first seeds, and the first of their iterations."""
-        courses = tuple(course.cut(iterations) for course in self.courses[:seeds])
-        return Seeds(jobs=self.jobs[:seeds], courses=courses, broken=self.broken[:seeds])
+        curves = tuple(curve.cut(iterations) for curve in self.curves[:seeds])
+        return Seeds(jobs=self.jobs[:seeds], curves=curves, broken=self.broken[:seeds])
 
     @property
     def walking(self) -> int:
-        """How many walk over the last tenth of their course, by speed and machine."""
+        """How many walk over the last tenth of their curve, by speed and machine."""
         return sum(
-            course.late("speed") > WALKING_SPEED and course.late("changes_per_s") > WALKING_CHANGES
-            for course in self._sound
+            curve.late("speed") > WALKING_SPEED and curve.late("changes_per_s") > WALKING_CHANGES
+            for curve in self._sound
         )
 
     @property
     def moving(self) -> int:
         """How many are as fast then, in whatever gait."""
-        return sum(course.late("speed") > WALKING_SPEED for course in self._sound)
+        return sum(curve.late("speed") > WALKING_SPEED for curve in self._sound)
 
     @property
     def walk_from(self) -> float | None:
         """Median iteration from which they walk; None if the middle one never does."""
-        return median_iteration([course.walks_at for course in self.courses])
+        return median_iteration([curve.walks_at for curve in self.curves])
 
     @property
     def move_from(self) -> float | None:
         """Median iteration from which they are as fast."""
-        return median_iteration([course.moves_at for course in self.courses])
+        return median_iteration([curve.moves_at for curve in self.curves])
 
     @property
     def cross_zero_at(self) -> float | None:
         """Median iteration from which their reward is positive."""
-        return median_iteration([course.crosses_zero_at for course in self.courses])
+        return median_iteration([curve.crosses_zero_at for curve in self.curves])
 
     def late(self, column: str) -> float | None:
         """Mean over the runs that did not break down, over the last tenth of each."""
-        values = [course.late(column) for course in self._sound]
+        values = [curve.late(column) for curve in self._sound]
         return fmean(values) if values and all(map(isfinite, values)) else None
 
     @property
-    def _sound(self) -> list[Course]:
-        return [c for c, broken in zip(self.courses, self.broken, strict=True) if not broken]
+    def _sound(self) -> list[LearningCurve]:
+        return [c for c, broken in zip(self.curves, self.broken, strict=True) if not broken]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,26 +182,28 @@ class Results:
     """By name of setting and gait; what has no run that is over is missing."""
 
     @classmethod
-    def read(cls, plan: Plan, runs: Path, told: Told | None = None) -> "Results":
+    def read(cls, plan: Plan, runs: Path, earlier: EarlierRuns | None = None) -> "Results":
         """Reads the progress of every run of the plan that is over, or that a report tells of."""
-        told = told or Told()
+        earlier = earlier or EarlierRuns()
         found: dict[tuple[str, str], Seeds] = {}
         for job in plan.jobs:
             folder = runs / job.name
             if is_over(job, folder):
                 progress = folder / PROGRESS
-                course = Course.read(progress) if progress.is_file() else Course.empty()
+                curve = (
+                    LearningCurve.read(progress) if progress.is_file() else LearningCurve.empty()
+                )
                 broken = (folder / FAILED).is_file()
-            elif job.name in told.courses:
-                course, broken = told.courses[job.name], job.name in told.broken
+            elif job.name in earlier.curves:
+                curve, broken = earlier.curves[job.name], job.name in earlier.broken
             else:
                 continue
             key = (job.setting.name, job.gait)
-            sofar = found.get(key, Seeds(jobs=(), courses=(), broken=()))
+            sofar = found.get(key, Seeds(jobs=(), curves=(), broken=()))
             found[key] = replace(
                 sofar,
                 jobs=(*sofar.jobs, job),
-                courses=(*sofar.courses, course),
+                curves=(*sofar.curves, curve),
                 broken=(*sofar.broken, broken),
             )
         return cls(plan=plan, seeds=found)

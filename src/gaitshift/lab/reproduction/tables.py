@@ -1,23 +1,18 @@
 """The small CSV files of a reproduction."""
 
-import csv
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
-from gaitshift.lab.reproduction.courses import DECIMALS
-from gaitshift.lab.reproduction.judging import Judged
+from gaitshift.lab.reproduction.judging import JudgedPolicy
+from gaitshift.lab.reproduction.learning_curve import DECIMALS
 from gaitshift.lab.reproduction.plan import ABLATED
-from gaitshift.lab.reproduction.results import Results, Seeds
+from gaitshift.lab.reproduction.results import Results, Seeds, fingerprint
 from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
-from gaitshift.lab.reproduction.told import fingerprint
+from gaitshift.table import Row
 
 ABLATED_RUNS = "ablations.csv"
 
-Row = dict[str, Any]
 
-
-def gait_rows(judged: list[Judged]) -> list[Row]:
+def gait_rows(judged: list[JudgedPolicy]) -> list[Row]:
     """A row a policy of the paper's setting: from when it walked, and how it walks."""
     return [
         {
@@ -46,34 +41,26 @@ def run_rows(results: Results) -> list[Row]:
             "setting": job.setting.name,
             "gait": job.gait,
             "seed": job.seed,
-            "iterations": len(course),
+            "iterations": len(curve),
             "broke_down": broken,
             "recipe": fingerprint(job),
         }
         for seeds in results.seeds.values()
-        for job, course, broken in zip(seeds.jobs, seeds.courses, seeds.broken, strict=True)
+        for job, curve, broken in zip(seeds.jobs, seeds.curves, seeds.broken, strict=True)
     ]
 
 
 def curve_rows(results: Results) -> Iterator[Row]:
     """A row an iteration of every run."""
     for (setting, gait), seeds in results.seeds.items():
-        for job, course in zip(seeds.jobs, seeds.courses, strict=True):
+        for job, curve in zip(seeds.jobs, seeds.curves, strict=True):
             run: Row = {"setting": setting, "gait": gait, "seed": job.seed}
             columns = [
-                [f"{value:.{digits}f}" for value in getattr(course, name)]
+                [f"{value:.{digits}f}" for value in getattr(curve, name)]
                 for name, digits in DECIMALS.items()
             ]
             for index, entries in enumerate(zip(*columns, strict=True)):
                 yield {**run, "iteration": index + 1, **dict(zip(DECIMALS, entries, strict=True))}
-
-
-def write(rows: list[Row], path: Path) -> None:
-    """Writes rows of the same columns."""
-    with path.open("w", newline="") as file:
-        lines = csv.DictWriter(file, rows[0].keys(), lineterminator="\n")
-        lines.writeheader()
-        lines.writerows(rows)
 
 
 def _ablation_row(setting: Setting, seeds: Seeds) -> Row:
@@ -88,7 +75,7 @@ def _ablation_row(setting: Setting, seeds: Seeds) -> Row:
         "gait": ABLATED,
         "seeds": len(seeds),
         "broke_down": sum(seeds.broken),
-        "iterations": max(map(len, seeds.courses)),
+        "iterations": max(map(len, seeds.curves)),
         "walking": seeds.walking,
         "walk_from_iteration": seeds.walk_from,
         "as_fast": seeds.moving,

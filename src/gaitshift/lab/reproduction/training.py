@@ -1,11 +1,11 @@
 """One job trained to its end, whatever became of it before."""
 
-import csv
 import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from gaitshift import table
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.reproduction.plan import Job
@@ -45,10 +45,7 @@ def train(job: Job, folder: Path) -> None:
 def iterations_done(folder: Path) -> int:
     """Iterations that a run has behind it, by the lines of its progress."""
     path = folder / PROGRESS
-    if not path.is_file():
-        return 0
-    with path.open(newline="") as file:
-        return sum(1 for _ in csv.reader(file)) - 1
+    return len(table.read(path, may_be_cut=True)) if path.is_file() else 0
 
 
 def _started(folder: Path) -> bool:

@@ -11,12 +11,11 @@ from gaitshift.control import Autonomous, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.lab.evaluation.evaluate import grounds_of, starts
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis import robot_mass
 from gaitshift.lab.identification import is_rough
 from gaitshift.lab.log import Log
 from gaitshift.lab.studies.batches import in_batches
-from gaitshift.robot.motion import GRAVITY, Motion
-from gaitshift.shift import Condition, GaitGraph, Oracle, load_condition
+from gaitshift.robot.state import GRAVITY, Privileged
+from gaitshift.shift import GaitGraph, between, load_graph
 from gaitshift.sim.world import World
 
 BEFORE, NOISE, AFTER = 4.0, 15.0, 5.0
@@ -30,7 +29,7 @@ BATCH = 256
 
 
 @dataclass(frozen=True)
-class Way:
+class Strategy:
     """How robots choose their gait."""
 
     name: str
@@ -46,16 +45,14 @@ class Way:
         return (self.start,) if self.graph is None else self.graph.gaits
 
 
-def ways(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Way, ...]:
+def strategies(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Strategy, ...]:
     """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
-    seen = Condition(statistic=Oracle(), alpha=0.5, beta=0.0, alpha_back=0.5, beta_back=0.0)
-    by = {name: load_condition(name) for name in conditions} | {"oracle": seen}
     return (
-        Way(f"{flat} only", flat),
-        Way(f"{rough} only", rough),
+        Strategy(f"{flat} only", flat),
+        Strategy(f"{rough} only", rough),
         *(
-            Way(name, flat, GaitGraph.of(condition, flat=flat, rough=rough))
-            for name, condition in by.items()
+            Strategy(name, flat, between(load_graph(name), flat=flat, rough=rough))
+            for name in dict.fromkeys((*conditions, "oracle"))
         ),
     )
 
@@ -80,7 +77,7 @@ class Crossings:
 
 def cross(
     policies: Mapping[str, Policy],
-    way: Way,
+    way: Strategy,
     *,
     amplitude: float,
     runs: int,
@@ -98,7 +95,7 @@ def cross(
 
 
 def _batch(
-    policies: Mapping[str, Policy], way: Way, amplitude: float, n: int, *, seed: int
+    policies: Mapping[str, Policy], way: Strategy, amplitude: float, n: int, *, seed: int
 ) -> Crossings:
     rng = np.random.default_rng(seed)
     way_to_go = BEFORE + NOISE + AFTER
@@ -111,8 +108,8 @@ def _batch(
     world = World(driver.robot, grounds, n, gains=driver.gains)
     name, x0, length = grounds[0].name, grounds[0].origin[0], grounds[0].size[0]
 
-    def sees(motion: Motion) -> Bool[np.ndarray, " N"]:
-        return is_rough(motion.base_position_w[:, 0], name, x0, length)
+    def rough(truth: Privileged) -> Bool[np.ndarray, " N"]:
+        return is_rough(truth.base_position_w[:, 0], name, x0, length)
 
     start = starts(driver, rng)
     log = rollout(
@@ -121,15 +118,15 @@ def _batch(
         RolloutConfig(seconds=seconds),
         start_xy=start,
         rng=rng,
-        switcher=None if way.graph is None else Autonomous(way.graph, n, sees=sees),
+        switcher=None if way.graph is None else Autonomous(way.graph, n, rough=rough),
         finish_x=float(start[:, 0].max()) + way_to_go,
     )
-    return measure_crossings(log, way_to_go)
+    return measure_crossings(log, way_to_go, driver.robot.mass)
 
 
-def measure_crossings(log: Log, way_to_go: float) -> Crossings:
-    """What a log says of its robots, each on a way of this length from where it starts [m]."""
-    x = log.qpos[..., 0].astype(float) - log.qpos[0, :, 0]
+def measure_crossings(log: Log, way_to_go: float, mass: float) -> Crossings:
+    """What a log says of its robots: each of this mass [kg], on a way of this length [m]."""
+    x = log.truth.base_position_w[..., 0].astype(float) - log.truth.base_position_w[0, :, 0]
     over = ((x >= way_to_go) | log.fallen).cumsum(axis=0) > 0
     # entries until the finish, the fall or the end, itself included
     count = np.minimum((~over).sum(axis=0) + 1, len(x))
@@ -139,9 +136,9 @@ def measure_crossings(log: Log, way_to_go: float) -> Crossings:
     distance = np.clip(x[last, robots], 0.0, way_to_go)
     period = float(log.time[1] - log.time[0])
     going = np.arange(len(x))[:, None] < count
-    power = np.abs(log.torque * log.qvel[..., 6:]).sum(axis=-1).astype(float)
+    power = log.sensed.power.astype(float)
     work = (power * going).sum(axis=0) * period
-    weight = robot_mass(log.robot) * GRAVITY
+    weight = mass * GRAVITY
     far = distance >= 1.0
     changed = (np.diff(log.gait, axis=0) != 0) & going[1:]
     return Crossings(

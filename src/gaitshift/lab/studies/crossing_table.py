@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.lab.identification import wilson
-from gaitshift.lab.studies.crossing import AFTER, BEFORE, NOISE, PATIENCE, Crossings, Way
-from gaitshift.lab.table import Row
+from gaitshift.lab.studies.crossing import AFTER, BEFORE, NOISE, PATIENCE, Crossings, Strategy
+from gaitshift.table import Row, markdown
 
 COLUMNS: dict[str, type] = {
     "amplitude": float,
@@ -37,7 +37,7 @@ ENOUGH = 2
 """Shifts that one stretch of noise is worth; more are chatter."""
 
 
-def row_of(way: Way, amplitude: float, seed: int, crossings: Crossings) -> Row:
+def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> Row:
     """What came of the crossings of one way."""
     n, fell = len(crossings.fell), int(crossings.fell.sum())
     low, high = wilson(np.array([float(n - fell)]), np.array([float(n)]))
@@ -72,11 +72,6 @@ def mean_of(values: Float[np.ndarray, " K"]) -> tuple[float | str, float | str]:
     return round(float(values.mean()), 4), round(half, 4)
 
 
-def is_of(row: Row, way: Way, amplitude: float) -> bool:
-    """Whether a row holds the crossings of this way over this noise."""
-    return (row["amplitude"], row["way"]) == (amplitude, way.name)
-
-
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
     head = (
@@ -105,10 +100,9 @@ def page(rows: Sequence[Row], command: str) -> str:
     ]
     for amplitude in dict.fromkeys(row["amplitude"] for row in rows):
         of = [row for row in rows if row["amplitude"] == amplitude]
-        lines = [head, ("---",) * len(head), *(_cells(row) for row in of)]
         parts += [
             f"## {amplitude:g} m",
-            "\n".join(f"| {' | '.join(line)} |" for line in lines),
+            markdown(head, [_cells(row) for row in of]),
         ]
     return "\n\n".join(parts) + "\n"
 

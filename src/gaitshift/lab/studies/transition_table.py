@@ -1,10 +1,12 @@
-"""The table of shifts: a row a pair and ground."""
+"""The table and the page of shifts: a row a pair and ground."""
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from gaitshift.lab.identification import wilson
 from gaitshift.lab.studies.transitions import Outcomes, Pair
-from gaitshift.lab.table import Row
+from gaitshift.table import Row, markdown
 
 PHASES = 10
 """Parts that the stride is cut into."""
@@ -27,6 +29,27 @@ COLUMNS: dict[str, type] = {
     "worst_phase_success": float,
 }
 """Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
+
+_INTRODUCTION = """# Gait shifts at a random phase
+
+Policy and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds
+if the robot does not fall within 5 s and, from some stride on, the contacts match the new gait in
+at least half of the steps of every stride. Settle time ends with the first such stride. Dip is the
+largest drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 %
+Wilson intervals."""
+
+HEAD = (
+    "from",
+    "to",
+    "succeeded",
+    "interval",
+    "fell",
+    "settled, 95 % within [s]",
+    "dip [m/s]",
+    "tilt, 95 % within [°]",
+    "worst phase",
+)
+"""Above the cells of `row_cells`."""
 
 
 def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
@@ -59,6 +82,36 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
     }
 
 
-def is_of(row: Row, pair: Pair, ground: str) -> bool:
-    """Whether a row holds the shifts of this pair on this ground."""
-    return (row["old"], row["new"], row["ground"]) == (pair.old, pair.new, ground)
+def page(rows: Sequence[Row], command: str) -> str:
+    """The whole page; `command` made the last of the rows."""
+    parts = [_INTRODUCTION, f"Made by `{command}`. The same as an [interactive page](page.html)."]
+    for ground in dict.fromkeys(row["ground"] for row in rows):
+        of = [row for row in rows if row["ground"] == ground]
+        total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
+        parts += [
+            f"## {ground}",
+            f"{good} of {total} shifts succeeded.",
+            f"![Failed shifts on {ground}]({picture_of(ground)})",
+            markdown(HEAD, [row_cells(row) for row in of]),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def picture_of(ground: str) -> str:
+    """File name of the map of a ground."""
+    return f"{ground.replace(':', '-')}.png"
+
+
+def row_cells(row: Row) -> tuple[str, ...]:
+    """A row of the table of shifts as text."""
+    return (
+        row["old"],
+        row["new"],
+        f"{row['successes']} of {row['switches']}",
+        f"{row['low']:.4f} to {row['high']:.4f}",
+        str(row["fell"]),
+        str(row["settle_s_p95"]),
+        f"{row['dip_m_s']:.2f}",
+        f"{row['tilt_deg_p95']:.0f}",
+        f"{row['worst_phase']}: {row['worst_phase_success']:.3f}",
+    )

@@ -7,15 +7,16 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.control import Controller, Decision, Driver
+from gaitshift.control import Controller, Driver
 from gaitshift.control.policy import Policy
+from gaitshift.control.switcher import uncounted
 from gaitshift.lab.evaluation.evaluate import grounds_of, starts
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
-from gaitshift.lab.gait_analysis.base import forward_speed
 from gaitshift.lab.log import Log
 from gaitshift.lab.studies.batches import in_batches
-from gaitshift.robot.command import CONTROL_PERIOD, Command
-from gaitshift.robot.motion import Motion, rotation_of
+from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.state import Privileged, Proprioception, rotation_of
+from gaitshift.shift import Decision
 from gaitshift.sim.world import World
 
 GROUNDS = ("flat", "perlin:0.10")
@@ -90,12 +91,13 @@ class _AtSteps:
     step_of: Int[np.ndarray, " N"]
     gait: str
 
-    def step(self, time: float, motion: Motion, driver: Controller, command: Command) -> Decision:
-        """Changes those that are due in the control step that ends at `time`."""
-        now = round(time / CONTROL_PERIOD)
-        driver.switch(np.flatnonzero(self.step_of == now), self.gait, motion)
-        nothing = np.zeros(driver.n)
-        return Decision(k=nothing, threshold=nothing, foot_height=np.zeros((driver.n, 4)))
+    def step(
+        self, sensed: Proprioception, controller: Controller, truth: Privileged | None = None
+    ) -> Decision:
+        """Changes those that are due in the control step that ends now."""
+        due = self.step_of == round(float(sensed.time) / CONTROL_PERIOD)
+        controller.switch(np.flatnonzero(due), self.gait, sensed)
+        return uncounted(due)
 
 
 def _run_batch(
@@ -123,7 +125,7 @@ def _run_batch(
 
 def measure_shifts(log: Log, at: Int[np.ndarray, " N"], old: Policy, new: Policy) -> Outcomes:
     """Outcomes of a log in which each robot changed its gait in entry `at`."""
-    n = log.contact.shape[1]
+    n = log.n
     watched = round(WATCHED / CONTROL_PERIOD)
     # (watched, N); a log may end early, when all have fallen
     entries: np.ndarray = np.minimum(at + 1 + np.arange(watched)[:, None], len(log.time) - 1)
@@ -131,11 +133,11 @@ def measure_shifts(log: Log, at: Int[np.ndarray, " N"], old: Policy, new: Policy
     fallen: np.ndarray = log.fallen[entries, robots]
     stride = round(1.0 / (new.info.stride_frequency * CONTROL_PERIOD))
     shown = running_mean(log.stance_shown[entries, robots].astype(float), stride)
-    forward = forward_speed(log)[entries, robots].astype(float)
-    upright = rotation_of(log.qpos[entries, robots, 3:7].astype(float))[..., 2, 2]
+    forward = log.truth.forward_speed[entries, robots].astype(float)
+    upright = rotation_of(log.truth.base_quaternion_w[entries, robots].astype(float))[..., 2, 2]
     slower = min(old.info.forward_speed, new.info.forward_speed)
     return Outcomes(
-        phase=_phase(log.contact[..., 0], at, old),
+        phase=_phase(log.sensed.contact[..., 0], at, old),
         fell=fallen[-1],
         settle=_settled(shown >= REACHED, stride),
         dip=np.maximum(slower - running_mean(forward, stride).min(axis=0), 0.0),

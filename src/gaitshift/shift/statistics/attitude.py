@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.shift.signals import Signals
-from gaitshift.shift.statistic import check_positive
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift.statistic import SearchRange, check_positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +22,7 @@ class AttitudeVariance:
     unit = "rad"
     width = 1
     needs = ()
+    search = SearchRange(low=0.003, high=0.3, note="deviation of roll and pitch")
 
     def __post_init__(self) -> None:
         check_positive(self, "window")
@@ -31,12 +32,12 @@ class AttitudeVariance:
         return np.zeros((n, 5))
 
     def step(
-        self, state: Float[np.ndarray, "N 5"], signals: Signals
+        self, state: Float[np.ndarray, "N 5"], sensed: Proprioception
     ) -> tuple[Float[np.ndarray, "N 5"], Float[np.ndarray, "N 1"]]:
         """Means after this step, and the deviation."""
-        x, y, z = signals.gravity_b.T
+        x, y, z = sensed.gravity_b.T
         angle = np.stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))], axis=1)
-        share = signals.period / self.window
+        share = sensed.period / self.window
         weight = state[:, :1] + share * (1.0 - state[:, :1])
         gain = share / weight  # a plain mean at first, then a forgetting one
         off = angle - state[:, 1:3]

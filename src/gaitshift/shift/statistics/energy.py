@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.robot.motion import GRAVITY
-from gaitshift.shift.signals import Signals
-from gaitshift.shift.statistic import check_positive
+from gaitshift.robot.description import ANYMAL_B
+from gaitshift.robot.state import GRAVITY, Proprioception
+from gaitshift.shift.statistic import SearchRange, check_positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,14 +16,15 @@ class CostOfTransport:
 
     window: float = 1.0
     """Power and speed are means that forget by e in this time [s]."""
-    mass: float = 30.48
-    """[kg]; ANYmal B's."""
+    mass: float = ANYMAL_B.mass
+    """[kg]; of another robot its `Robot.mass`."""
     least_speed: float = 0.1
     """A slower robot counts as this fast [m/s]."""
 
     unit = ""
     width = 1
-    needs = ("power", "velocity_b")
+    needs = ("joint_torque", "joint_velocity", "velocity_b")
+    search = SearchRange(low=0.1, high=10.0, note="power over weight and speed")
 
     def __post_init__(self) -> None:
         check_positive(self, "window", "mass", "least_speed")
@@ -33,13 +34,13 @@ class CostOfTransport:
         return np.zeros((n, 3))
 
     def step(
-        self, state: Float[np.ndarray, "N 3"], signals: Signals
+        self, state: Float[np.ndarray, "N 3"], sensed: Proprioception
     ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
         """Means after this step, and the cost."""
-        power = signals.need("power", "cost_of_transport")
-        speed = signals.need("velocity_b", "cost_of_transport")[:, 0]
+        power = sensed.power
+        speed = sensed.forward_speed
         now = np.stack([np.ones(len(power)), power, speed], axis=1)
-        after = state + signals.period / self.window * (now - state)
+        after = state + sensed.period / self.window * (now - state)
         weight, mean_power, mean_speed = after.T
         mean_speed = np.maximum(mean_speed / weight, self.least_speed)
         cost = mean_power / weight / (self.mass * GRAVITY * mean_speed)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,15 +43,15 @@ class HeadingWatch:
         return HeadingState(yaw=np.full(n, np.nan), rate=np.zeros(n))
 
     def step(
-        self, state: HeadingState, signals: Signals
+        self, state: HeadingState, sensed: Proprioception
     ) -> tuple[HeadingState, Float[np.ndarray, " N"]]:
-        """The heading after this step, and how far off each is [rad]; 0 where no yaw is given."""
-        if signals.yaw is None:
+        """The heading after this step, and how far off each is [rad]; 0 without a heading."""
+        if not sensed.has_heading:
             return state, np.zeros(len(state.yaw))
-        period = signals.period
+        period = sensed.period
         kept = np.exp(-self.frequency * period)
-        expected = np.where(np.isnan(state.yaw), signals.yaw, state.yaw + state.rate * period)
-        off = np.remainder(signals.yaw - expected + np.pi, 2.0 * np.pi) - np.pi
+        expected = np.where(np.isnan(state.yaw), sensed.yaw, state.yaw + state.rate * period)
+        off = np.remainder(sensed.yaw - expected + np.pi, 2.0 * np.pi) - np.pi
         after = HeadingState(
             yaw=expected + (1.0 - kept * kept) * off,
             rate=state.rate + (1.0 - kept) ** 2 / period * off,

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.robot.motion import GRAVITY
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import GRAVITY, Proprioception
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,15 +43,15 @@ class LegOdometry:
         )
 
     def step(
-        self, state: OdometryState, signals: Signals
+        self, state: OdometryState, sensed: Proprioception
     ) -> tuple[OdometryState, Float[np.ndarray, "N 4 3"]]:
         """The base after this step, and where each foot is in the same frame [m]."""
-        foot = upright(signals)
-        stands = signals.contact & state.contact
+        foot = upright(sensed)
+        stands = sensed.contact & state.contact
         count = stands.sum(axis=1)[:, None]
         back = np.where(stands[..., None], state.foot - foot, 0.0).sum(axis=1)
         by_feet = back / np.maximum(count, 1)
-        period = signals.period
+        period = sensed.period
         fall = np.array([0.0, 0.0, GRAVITY * period])
         by_flight = (state.velocity - 0.5 * fall) * period
         move = np.where(count > 0, by_feet, by_flight)
@@ -60,24 +59,24 @@ class LegOdometry:
         by_feet_velocity = state.velocity + share * (by_feet / period - state.velocity)
         velocity = np.where(count > 0, by_feet_velocity, state.velocity - fall)
         base = state.base + move
-        after = OdometryState(base=base, velocity=velocity, foot=foot, contact=signals.contact)
+        after = OdometryState(base=base, velocity=velocity, foot=foot, contact=sensed.contact)
         return after, base[:, None] + foot
 
 
-def upright(signals: Signals) -> Float[np.ndarray, "N 4 3"]:
+def upright(sensed: Proprioception) -> Float[np.ndarray, "N 4 3"]:
     """Feet from the base with z along the vertical, and x, y turned by the yaw [m].
 
-    Where no yaw is given, x is the body's heading.
+    Where there is no heading, x is the body's heading.
     """
-    up = -signals.gravity_b
+    up = -sensed.gravity_b
     ux, uy, uz = (up[:, None, axis] for axis in range(3))
-    px, py, pz = (signals.foot_position_b[..., axis] for axis in range(3))
+    px, py, pz = (sensed.foot_position_b[..., axis] for axis in range(3))
     level = np.sqrt(np.maximum(1.0 - ux * ux, 1e-12))  # of the body's x axis in the horizontal
     # Rows of the rotation: the heading, the horizontal to its left, and up.
     x = level * px - ux * (uy * py + uz * pz) / level
     y = (uz * py - uy * pz) / level
     z = ux * px + uy * py + uz * pz
-    if signals.yaw is None:
+    if not sensed.has_heading:
         return np.stack([x, y, z], axis=2)
-    c, s = np.cos(signals.yaw)[:, None], np.sin(signals.yaw)[:, None]
+    c, s = np.cos(sensed.yaw)[:, None], np.sin(sensed.yaw)[:, None]
     return np.stack([c * x - s * y, s * x + c * y, z], axis=2)

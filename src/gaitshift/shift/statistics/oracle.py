@@ -1,24 +1,30 @@
-"""A point of reference: a condition that sees the ground."""
+"""A point of reference: what a condition would do that sees the ground."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from gaitshift.shift.signals import Signals
+from gaitshift.shift.statistic import SearchRange
 
 
 @dataclass(frozen=True, kw_only=True)
 class Oracle:
-    """1 where the ground under the robot is rough, 0 where not."""
+    """1 where the ground under the robot is rough, 0 where not.
+
+    No `Statistic`: it reads the truth, which a robot does not have.
+    """
 
     unit = ""
     width = 1
-    needs = ("rough",)
+    needs = ()
+    search = SearchRange(
+        low=0.4, high=0.6, leaks=(0.0,), note="sees the ground: a point of reference"
+    )
 
     def start(self, n: int) -> None:
         """Nothing to remember."""
 
-    def step(self, state: None, signals: Signals) -> tuple[None, Float[np.ndarray, "N 1"]]:
-        """What the signal says."""
-        return None, signals.need("rough", "oracle").astype(np.float64)[:, None]
+    def values(self, rough: Bool[np.ndarray, "*batch"]) -> Float[np.ndarray, "*batch 1"]:
+        """The truth as a number."""
+        return rough.astype(np.float64)[..., None]

@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift.statistic import SearchRange
 from gaitshift.shift.statistics.touches import Touches, TouchState, fit_plane
 
 LEAST = 4
@@ -32,6 +33,7 @@ class PlaneResidual:
     unit = "m"
     width = 1
     needs = ()
+    search = SearchRange(low=0.002, high=0.2, note="two touches a foot about their plane")
 
     def __post_init__(self) -> None:
         _ = self._memory
@@ -45,10 +47,10 @@ class PlaneResidual:
         return self._memory.start(n)
 
     def step(
-        self, state: TouchState, signals: Signals
+        self, state: TouchState, sensed: Proprioception
     ) -> tuple[TouchState, Float[np.ndarray, "N 1"]]:
         """Touches after this step, and how far from a plane they lie."""
-        after, _, _ = self._memory.step(state, signals)
+        after, _, _ = self._memory.step(state, sensed)
         points = after.points
         return after, deviation(points, ~np.isnan(points[..., 0]))[:, None]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.shift.signals import Signals
-from gaitshift.shift.statistic import check_positive
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift.statistic import SIX_LEAKS, SearchRange, check_positive
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,6 +35,9 @@ class Slip:
     unit = "m/s"
     width = 4
     needs = ("velocity_b", "angular_velocity_b")
+    search = SearchRange(
+        low=0.02, high=2.0, leaks=SIX_LEAKS, note="speed of feet that ought to stand"
+    )
 
     def __post_init__(self) -> None:
         check_positive(self, "window")
@@ -48,16 +51,16 @@ class Slip:
         )
 
     def step(
-        self, state: SlipState, signals: Signals
+        self, state: SlipState, sensed: Proprioception
     ) -> tuple[SlipState, Float[np.ndarray, "N 4"]]:
         """Mean speeds after this step."""
-        velocity: np.ndarray = signals.need("velocity_b", "slip")[:, None]
-        angular: np.ndarray = signals.need("angular_velocity_b", "slip")[:, None]
-        position = signals.foot_position_b
-        own = (position - state.position_b) / signals.period
+        velocity: np.ndarray = sensed.need("velocity_b", "slip")[:, None]
+        angular: np.ndarray = sensed.need("angular_velocity_b", "slip")[:, None]
+        position = sensed.foot_position_b
+        own = (position - state.position_b) / sensed.period
         speed: np.ndarray = np.linalg.norm(velocity + np.cross(angular, position) + own, axis=2)
-        share = min(1.0, signals.period / self.window)
+        share = min(1.0, sensed.period / self.window)
         mean = state.speed + share * (speed - state.speed)
         mean = np.where(np.isnan(state.speed), speed, mean)
-        mean = np.where(signals.contact & state.contact, mean, state.speed)
-        return SlipState(position_b=position, contact=signals.contact, speed=mean), mean
+        mean = np.where(sensed.contact & state.contact, mean, state.speed)
+        return SlipState(position_b=position, contact=sensed.contact, speed=mean), mean

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -14,11 +14,12 @@ class SpeedCommand:
 
     unit = "m/s"
     width = 1
-    needs = ("speed_command",)
+    needs = ("forward_speed_command",)
+    search = None
 
     def start(self, n: int) -> None:
         """Nothing to remember."""
 
-    def step(self, state: None, signals: Signals) -> tuple[None, Float[np.ndarray, "N 1"]]:
-        """What the signal says."""
-        return None, signals.need("speed_command", "speed")[:, None]
+    def step(self, state: None, sensed: Proprioception) -> tuple[None, Float[np.ndarray, "N 1"]]:
+        """The command of this step."""
+        return None, sensed.need("forward_speed_command", "speed")[:, None]

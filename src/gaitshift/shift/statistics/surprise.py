@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift.statistic import SearchRange
 from gaitshift.shift.statistics.heading import HeadingState, HeadingWatch
 from gaitshift.shift.statistics.touches import Touches, TouchState, fit_plane
 
@@ -93,6 +94,12 @@ class TouchdownSurprise:
     unit = "m"
     width = 1
     needs = ()
+    search = SearchRange(
+        low=0.005 / 20 ** (50 / 99),  # 1.1 mm, in the steps of 100 values from 5 mm to 10 cm
+        high=0.1,
+        count=150,
+        note="how new touches change about the plane of the earlier ones",
+    )
 
     def __post_init__(self) -> None:
         _ = self._memory
@@ -115,12 +122,12 @@ class TouchdownSurprise:
         )
 
     def step(
-        self, state: SurpriseState, signals: Signals
+        self, state: SurpriseState, sensed: Proprioception
     ) -> tuple[SurpriseState, Float[np.ndarray, "N 1"]]:
         """Errors after this step, and what their changes come to; NaN until there are enough."""
-        touches, new, foot = self._memory.step(state.touches, signals)
-        heading, off = _HEADING.step(state.heading, signals)
-        share = min(1.0, signals.period / ASIDE_WINDOW)
+        touches, new, foot = self._memory.step(state.touches, sensed)
+        heading, off = _HEADING.step(state.heading, sensed)
+        share = min(1.0, sensed.period / ASIDE_WINDOW)
         aside = state.aside + share * (off * off - state.aside)
         error, change, steep = state.error, state.change, state.steep
         ids = np.flatnonzero(new.any(axis=1))

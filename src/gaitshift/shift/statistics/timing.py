@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift.statistic import SIX_LEAKS, SearchRange
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,7 +31,10 @@ class ContactTiming:
 
     unit = "s"
     width = 4
-    needs = ("stride",)
+    needs = ("stride_frequency_command",)
+    search = SearchRange(
+        low=0.005, high=0.5, leaks=SIX_LEAKS, note="strides shorter or longer than commanded"
+    )
 
     def start(self, n: int) -> TimingState:
         """State of n robots of which no foot has come down."""
@@ -41,13 +45,13 @@ class ContactTiming:
         )
 
     def step(
-        self, state: TimingState, signals: Signals
+        self, state: TimingState, sensed: Proprioception
     ) -> tuple[TimingState, Float[np.ndarray, "N 4"]]:
         """Errors after this step."""
-        stride = signals.need("stride", "contact_timing")[:, None]
-        down = signals.contact & ~state.contact
-        since = signals.time - state.touchdown
+        stride = 1.0 / sensed.need("stride_frequency_command", "contact_timing")[:, None]
+        down = sensed.contact & ~state.contact
+        since = sensed.time - state.touchdown
         error = np.where(down, np.abs(since - stride), state.error)
-        touchdown = np.where(down, signals.time, state.touchdown)
-        after = TimingState(contact=signals.contact, touchdown=touchdown, error=error)
-        return after, np.fmax(error, signals.time - touchdown - stride)
+        touchdown = np.where(down, sensed.time, state.touchdown)
+        after = TimingState(contact=sensed.contact, touchdown=touchdown, error=error)
+        return after, np.fmax(error, sensed.time - touchdown - stride)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.shift.signals import Signals
+from gaitshift.robot.state import Proprioception
 from gaitshift.shift.statistics.odometry import LegOdometry, OdometryState
 
 
@@ -54,20 +54,20 @@ class Touches:
         )
 
     def step(
-        self, state: TouchState, signals: Signals
+        self, state: TouchState, sensed: Proprioception
     ) -> tuple[TouchState, Bool[np.ndarray, "N 4"], Float[np.ndarray, "N 4 3"]]:
         """The touches after this step, which feet came down in it, and where all feet are [m].
 
         A foot's last touch goes along with it while it stands.
         """
-        odometry, foot = LegOdometry().step(state.odometry, signals)
-        contact = signals.contact
+        odometry, foot = LegOdometry().step(state.odometry, sensed)
+        contact = sensed.contact
         new = contact & (state.time_up >= self.least_swing)
         touch = state.touch.copy()
         if new.any():
             touch[:, :, 1:] = np.where(new[..., None, None], touch[:, :, :-1], touch[:, :, 1:])
         touch[:, :, 0] = np.where(contact[..., None], foot, touch[:, :, 0])
-        time_up = np.where(contact, 0.0, state.time_up + signals.period)
+        time_up = np.where(contact, 0.0, state.time_up + sensed.period)
         return TouchState(odometry=odometry, touch=touch, time_up=time_up), new, foot
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.shift.signals import Signals
-from gaitshift.shift.statistic import check_positive
+from gaitshift.robot.state import Proprioception
+from gaitshift.shift.statistic import SearchRange, check_positive
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +21,7 @@ class ValueDrop:
     unit = ""
     width = 1
     needs = ("value",)
+    search = SearchRange(low=0.01, high=100.0, note="the critic expects less than it did")
 
     def __post_init__(self) -> None:
         check_positive(self, "fast", "slow")
@@ -30,13 +31,13 @@ class ValueDrop:
         return np.zeros((n, 3))
 
     def step(
-        self, state: Float[np.ndarray, "N 3"], signals: Signals
+        self, state: Float[np.ndarray, "N 3"], sensed: Proprioception
     ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
         """Means after this step, and the drop."""
-        value = signals.need("value", "value_drop")
+        value = sensed.need("value", "value_drop")
         fast, slow, seen = state.T
         seen = seen + 1.0
-        fast = fast + np.maximum(1.0 / seen, signals.period / self.fast) * (value - fast)
-        slow = slow + np.maximum(1.0 / seen, signals.period / self.slow) * (value - slow)
-        drop = np.where(seen * signals.period < self.slow, np.nan, slow - fast)
+        fast = fast + np.maximum(1.0 / seen, sensed.period / self.fast) * (value - fast)
+        slow = slow + np.maximum(1.0 / seen, sensed.period / self.slow) * (value - slow)
+        drop = np.where(seen * sensed.period < self.slow, np.nan, slow - fast)
         return np.stack([fast, slow, seen], axis=1), drop[:, None]

@@ -1,13 +1,12 @@
-"""What is to be seen of N robots at one instant."""
+"""What is to be seen of N robots at one instant: a step of a log, and where feet touched last."""
 
 from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float
 
 from gaitshift.lab.log import Log
-from gaitshift.robot.motion import rotation_of
 
 _PLANE = 0.55, 0.4
 """Half of the length and width of the plane through the touches [m]."""
@@ -17,69 +16,45 @@ _PLANE = 0.55, 0.4
 class Frame:
     """N robots at one instant."""
 
-    time: float
-    """Since the start [s]."""
-    qpos: Float[np.ndarray, "N 19"]
-    """MuJoCo's positions."""
-    contact: Bool[np.ndarray, "N 4"]
-    """Whether each foot touches."""
+    step: Log
+    """All that is known of it."""
     touch_w: Float[np.ndarray, "N 4 3"]
     """Where each foot touched last, world frame [m]; NaN before."""
-    foot_position_w: Float[np.ndarray, "N 4 3"]
-    """Lowest point of each foot [m]."""
-    foot_height: Float[np.ndarray, "N 4"]
-    """The condition's h_i [m]."""
-    k: Float[np.ndarray, " N"]
-    """The counter of the edge that is nearest to firing."""
-    threshold: Float[np.ndarray, " N"]
-    """The β that it is held against; 0 where nothing counts."""
-    gait: Int[np.ndarray, " N"]
-    """Index of the gait."""
-    machine_state: Int[np.ndarray, " N"]
-    """State of its machine."""
-    speed: Float[np.ndarray, " N"]
-    """Velocity along the base's x axis [m/s]."""
-    fallen: Bool[np.ndarray, " N"]
-    """Whether the robot has fallen."""
+    touch_height: Float[np.ndarray, "N 4"]
+    """Height above the base of each foot then, along the vertical [m]; NaN before."""
 
+    @classmethod
+    def after(cls, before: "Frame | None", step: Log) -> "Frame":
+        """The frame of a step, `before` being the one before it."""
+        contact, feet, height = (
+            step.sensed.contact,
+            step.truth.foot_position_w,
+            step.sensed.foot_height,
+        )
+        if before is None:
+            unknown = np.full(contact.shape, np.nan)
+            before_w, before_height = np.full(feet.shape, np.nan), unknown
+        else:
+            before_w, before_height = before.touch_w, before.touch_height
+        return cls(
+            step=step,
+            touch_w=np.where(contact[..., None], feet, before_w),
+            touch_height=np.where(contact, height, before_height),
+        )
 
-def last_touches(
-    before: Float[np.ndarray, "N 4 3"],
-    contact: Bool[np.ndarray, "N 4"],
-    foot_position_w: Float[np.ndarray, "N 4 3"],
-) -> Float[np.ndarray, "N 4 3"]:
-    """Where each foot touched last, after a step with these contacts."""
-    return np.where(contact[..., None], foot_position_w, before)
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return float(self.step.sensed.time)
 
 
 def frames_of(log: Log, every: int) -> list[Frame]:
-    """The entries of a log, one of `every`."""
-    n = log.k.shape[1]
-    quaternion = log.qpos[..., 3:7].astype(float)
-    rotation = rotation_of(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True))
-    speed = np.einsum("tni,tni->tn", rotation[..., 0], log.qvel[..., :3].astype(float))
-    touch, frames = np.full((n, 4, 3), np.nan), list[Frame]()
+    """The entries of a log, one of `every`, in double precision."""
+    frames, frame = list[Frame](), None
     for t in range(len(log.time)):
-        feet = log.foot_position_w[t].astype(float)
-        touch = last_touches(touch, log.contact[t], feet)
-        if t % every:
-            continue
-        frames.append(
-            Frame(
-                time=float(log.time[t]),
-                qpos=log.qpos[t].astype(float),
-                contact=log.contact[t],
-                touch_w=touch,
-                foot_position_w=feet,
-                foot_height=log.foot_height[t].astype(float),
-                k=log.k[t],
-                threshold=log.threshold[t],
-                gait=log.gait[t].astype(int),
-                machine_state=log.machine_state[t].astype(int),
-                speed=speed[t],
-                fallen=log.fallen[t],
-            )
-        )
+        frame = Frame.after(frame, log[t].as_type(np.float64))
+        if t % every == 0:
+            frames.append(frame)
     return frames
 
 

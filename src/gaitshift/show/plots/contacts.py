@@ -9,10 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gaitshift.lab.log import Log
-from gaitshift.show.plots.palette import INK, QUIET, gait_colours
 from gaitshift.show.plots.rows import draw_contacts
 from gaitshift.show.plots.signals import check_robot, gait_spans, period, shift_times, window
-from gaitshift.show.plots.style import check_target, house_style, save
+from gaitshift.show.plots.style import INK, QUIET, check_target, gait_colours, house_style, save
 
 _SIZE = (7.5, 2.9)
 """[inch]"""
@@ -67,7 +66,7 @@ def _write_gaits(axes: Axes, log: Log, robot: int) -> None:
 def _write_shares(axes: Axes, log: Log, robot: int) -> None:
     """How long each foot stood, right of its lane."""
     right = axes.get_xlim()[1]
-    for leg, share in enumerate(log.contact[:, robot].mean(axis=0)):
+    for leg, share in enumerate(log.sensed.contact[:, robot].mean(axis=0)):
         axes.annotate(
             f"{100 * share:.0f} %",
             (right, leg),

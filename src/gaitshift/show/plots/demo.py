@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 
 from gaitshift.lab.log import Log
 from gaitshift.show.plots import rows
-from gaitshift.show.plots.palette import INK, PAPER, QUIET
 from gaitshift.show.plots.signals import (
     check_robot,
     fall_time,
@@ -21,7 +20,7 @@ from gaitshift.show.plots.signals import (
     period,
     shift_times,
 )
-from gaitshift.show.plots.style import check_target, house_style, save
+from gaitshift.show.plots.style import INK, PAPER, QUIET, check_target, house_style, save
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,11 @@ def _write_head(figure: Figure, log: Log, robot: int) -> None:
     shifted = f"{count or 'no'} gait shift{'' if count == 1 else 's'}"
     seconds = float(log.time[-1]) if fell is None else fell
     words = f"{shifted} in {seconds:.1f} s" + ("" if fell is None else ", then a fall")
-    metres = float(np.linalg.norm(log.qpos[-1, robot, :2] - log.qpos[0, robot, :2]))
+    metres = float(
+        np.linalg.norm(
+            log.truth.base_position_w[-1, robot, :2] - log.truth.base_position_w[0, robot, :2]
+        )
+    )
     detail = f"{log.robot}, {metres:.1f} m on {log.terrain.replace(',', ', ')}"
     page, left = float(figure.get_figheight()), _LEFT / _WIDTH
     figure.text(left, 1 - 0.30 / page, words, size=19, weight="bold", va="center")

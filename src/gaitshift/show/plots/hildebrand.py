@@ -1,24 +1,104 @@
 """A gait in one picture: Hildebrand's diagram of a robot, the phases of all, the verdict."""
 
 # matplotlib's own stubs leave **kwargs untyped:
+# pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 # pyright: reportUnknownMemberType=false
 
 from collections.abc import Mapping
+from math import log, pi, sqrt
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
 
 from gaitshift.gait import RewardMachine
-from gaitshift.gait.feet import feet_text
+from gaitshift.gait.elements import feet_text
+from gaitshift.lab.gait_analysis.phase import axial_of, ideal_of
 from gaitshift.lab.log import Log
 from gaitshift.robot.legs import LEGS
-from gaitshift.show.plots.palette import INK, PAPER, QUIET, gait_colours
-from gaitshift.show.plots.phase_circle import draw_phase_circle
 from gaitshift.show.plots.rows import draw_contacts
 from gaitshift.show.plots.signals import check_robot, fall_time, period, spans, window
-from gaitshift.show.plots.style import check_target, house_style, save
+from gaitshift.show.plots.style import (
+    INK,
+    LEG_COLOURS,
+    PALE,
+    PAPER,
+    QUIET,
+    check_target,
+    gait_colours,
+    house_style,
+    save,
+)
+
+_RINGS = (1.0, 0.77, 0.54, 0.31)
+"""Radius of each foot's ring: feet that come down together lie side by side."""
+
+_NAMES = (PAPER, PAPER, INK, INK)
+"""Colour of each foot's name on its mark: the hind feet's are light."""
+
+
+def draw_phase_circle(axes: Axes, figures: Mapping[str, Any], machine: RewardMachine) -> None:
+    """Each foot on a ring of its own, clockwise from the top, where FL comes down.
+
+    A filled mark at its mean phase, an arc of one circular standard deviation to either side,
+    √(-2 ln R) [rad], and an open mark at the ideal. A foot that comes down p times a stride has p
+    of each. `figures` are those of `gait_analysis.measure`.
+    """
+    polar = cast(PolarAxes, axes)
+    polar.set_theta_zero_location("N")
+    polar.set_theta_direction(-1)
+    polar.set_ylim(0.0, 1.12)
+    polar.set_yticks([])
+    polar.set_xticks(np.arange(4) * np.pi / 2, ["0", "0.25", "0.5", "0.75"])
+    polar.grid(visible=True, color=PALE)
+    polar.spines["polar"].set_visible(False)
+    ideal, axial = ideal_of(machine), axial_of(machine)
+    circle = np.linspace(0, 2 * np.pi, 181)
+    for leg, ring in enumerate(_RINGS):
+        p = axial[leg]
+        polar.plot(circle, np.full_like(circle, ring), color=PALE, linewidth=1.2, zorder=1)
+        for turn in np.arange(p) / p:
+            polar.plot(
+                2 * np.pi * (ideal[leg] + turn),
+                ring,
+                "o",
+                mfc="none",
+                mec=INK,
+                ms=19,
+                zorder=5,
+                mew=1.4,
+            )
+            _draw_mean(polar, figures, leg, ring, p, turn)
+
+
+def _draw_mean(
+    polar: PolarAxes, figures: Mapping[str, Any], leg: int, ring: float, p: int, turn: float
+) -> None:
+    phase: float | None = figures["phase"][leg]
+    consistency: float | None = figures["phase_consistency"][leg]
+    if phase is None or consistency is None:
+        return
+    angle = 2 * np.pi * (phase + turn)
+    spread = min(sqrt(-2 * log(min(max(consistency, 1e-9), 1.0))), pi) / p
+    arc = np.linspace(angle - spread, angle + spread, 61)
+    colour = LEG_COLOURS[leg]
+    polar.plot(arc, np.full_like(arc, ring), color=colour, linewidth=4, alpha=0.5, zorder=2)
+    polar.plot(angle, ring, "o", color=colour, ms=15, zorder=3)
+    polar.text(
+        angle,
+        ring,
+        LEGS[leg],
+        ha="center",
+        va="center",
+        color=_NAMES[leg],
+        size=8,
+        weight="bold",
+        zorder=4,
+    )
+
 
 SHOWN = 2.0
 """Time that the diagram shows: the robot's last on its feet [s]."""
@@ -39,7 +119,7 @@ def hildebrand_diagram(
     """Draws one robot's gait and the figures of all robots into a PNG, SVG or PDF file.
 
     Left: bars where each foot is down over the last 2 s [s], the state of the machine below, the
-    duty factors beside. Right: the phases (`phase_circle`). `figures` are those of
+    duty factors beside. Right: the phases (`draw_phase_circle`). `figures` are those of
     `gait_analysis.measure`.
 
     Raises:

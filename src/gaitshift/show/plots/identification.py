@@ -14,8 +14,16 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from gaitshift.lab.identification.judging import Judged
-from gaitshift.show.plots.palette import GROUND, INK, PALE, PAPER, QUIET
-from gaitshift.show.plots.style import check_target, house_style, save
+from gaitshift.show.plots.style import (
+    GROUND,
+    INK,
+    PALE,
+    PAPER,
+    QUIET,
+    check_target,
+    house_style,
+    save,
+)
 
 LINES = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"),

@@ -12,11 +12,13 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gaitshift.show.plots.palette import INK, QUIET, gait_colours
 from gaitshift.show.plots.style import (
     DASHES,
+    INK,
+    QUIET,
     check_target,
     few_ticks,
+    gait_colours,
     house_style,
     name_row,
     save,

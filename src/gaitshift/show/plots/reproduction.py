@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gaitshift.lab.log import Log
-from gaitshift.lab.reproduction.judging import Judged, middle
-from gaitshift.lab.reproduction.landmarks import PLATEAU, START, ZERO_CROSSING
+from gaitshift.lab.reproduction.judging import JudgedPolicy, middle
+from gaitshift.lab.reproduction.plan import PLATEAU, START, ZERO_CROSSING
 from gaitshift.lab.reproduction.results import Results, Seeds
 from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER
 from gaitshift.robot.command import PAPER_SPEED
@@ -18,11 +18,11 @@ CONTACT_TIME = 2.0
 """Length of a contact diagram [s], as in the paper's."""
 
 
-def draw(results: Results, judged: list[Judged], out: Path) -> list[str]:
+def draw(results: Results, judged: list[JudgedPolicy], out: Path) -> list[str]:
     """Draws what there is to draw into `out`; gives the names of the files."""
     drawn: list[str] = []
     rewards = {gait: _columns(seeds, "reward") for gait, seeds in results.gaits()}
-    rewards = {gait: courses for gait, courses in rewards.items() if courses}
+    rewards = {gait: curves for gait, curves in rewards.items() if curves}
     if rewards:
         landmarks = Landmarks(start=START, plateau=PLATEAU, zero_crossing=ZERO_CROSSING)
         reward_curves(rewards, landmarks, out / REWARDS)
@@ -63,11 +63,11 @@ def _panels(results: Results) -> Mapping[str, Mapping[str, Courses]]:
             panel = panels.setdefault(setting.group, first)
             panel[setting.label] = _columns(ablations[setting.name], "speed")
     return {
-        group: {label: courses for label, courses in panel.items() if courses}
+        group: {label: curves for label, curves in panel.items() if curves}
         for group, panel in panels.items()
     }
 
 
 def _columns(seeds: Seeds, column: str) -> Courses:
-    """One column of every run that has a course at all."""
-    return [getattr(course, column) for course in seeds.courses if len(course)]
+    """One column of every run that has a curve at all."""
+    return [getattr(curve, column) for curve in seeds.curves if len(curve)]

@@ -8,9 +8,7 @@ from matplotlib.axes import Axes
 
 from gaitshift.lab.log import Log
 from gaitshift.robot.legs import LEGS
-from gaitshift.show.plots.palette import GROUND, INK, LEG_COLOURS, PAPER, QUIET, gait_colours
 from gaitshift.show.plots.signals import (
-    forward_speed,
     gait_at,
     gait_spans,
     ground_below,
@@ -18,7 +16,17 @@ from gaitshift.show.plots.signals import (
     smoothed,
     spans,
 )
-from gaitshift.show.plots.style import DASHES, few_ticks, name_row
+from gaitshift.show.plots.style import (
+    DASHES,
+    GROUND,
+    INK,
+    LEG_COLOURS,
+    PAPER,
+    QUIET,
+    few_ticks,
+    gait_colours,
+    name_row,
+)
 
 _SPEED_SIGMA = 0.2
 """Of the window over the speed [s]: half a stride, so that the course is seen and not the steps."""
@@ -53,7 +61,7 @@ def draw_contacts(axes: Axes, log: Log, robot: int) -> None:
     """A bar for each stance phase of each foot, in the colour of the gait it began in."""
     colours = gait_colours(log.gaits)
     for leg in range(len(LEGS)):
-        contact = log.contact[:, robot, leg]
+        contact = log.sensed.contact[:, robot, leg]
         stances = [span for span in spans(log, contact) if contact[span.entry]]
         bars = [(span.begin, span.end - span.begin) for span in stances]
         faces = [colours[gait_at(log, robot, span.entry)] for span in stances]
@@ -67,8 +75,8 @@ def draw_contacts(axes: Axes, log: Log, robot: int) -> None:
 def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
     """The h_i that the shift condition compares, each from the foot's first touch on."""
     for leg, name in enumerate(LEGS):
-        known = np.cumsum(log.contact[:, robot, leg]) > 0
-        height, colour = 100 * log.foot_height[known, robot, leg], LEG_COLOURS[leg]
+        known = np.cumsum(log.sensed.contact[:, robot, leg]) > 0
+        height, colour = 100 * log.touch_height[known, robot, leg], LEG_COLOURS[leg]
         axes.plot(
             log.time[known],
             height,
@@ -109,7 +117,8 @@ def draw_counter(axes: Axes, log: Log, robot: int) -> None:
 
 def draw_speed(axes: Axes, log: Log, robot: int) -> None:
     """Forward speed, at each step and smoothed, and the speed commanded."""
-    speed, command = forward_speed(log, robot), log.command[:, robot, 0]
+    speed = log.truth.forward_speed[:, robot]
+    command = log.sensed.need("forward_speed_command", "the plot")[:, robot]
     course = smoothed(speed, period(log), _SPEED_SIGMA)
     axes.plot(log.time, speed, color=QUIET, alpha=0.35, linewidth=0.8, label="each step")
     axes.plot(
@@ -125,7 +134,7 @@ def draw_speed(axes: Axes, log: Log, robot: int) -> None:
 
 def draw_ground(axes: Axes, log: Log, robot: int) -> None:
     """The ground in profile, and the path of the base above it."""
-    base, ground = log.qpos[:, robot, 2], ground_below(log, robot)
+    base, ground = log.truth.base_position_w[:, robot, 2], ground_below(log, robot)
     bottom = min(float(ground.min()), 0.0) - 0.08
     axes.fill_between(log.time, ground, bottom, color=GROUND, linewidth=0)
     axes.plot(log.time, ground, color=INK, linewidth=1.0, label="ground")

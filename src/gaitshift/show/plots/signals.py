@@ -47,7 +47,7 @@ def window(log: Log, t0: float, t1: float) -> Log:
         raise GaitshiftError(
             f"times must be within {log.time[0]:g} to {log.time[-1]:g} s, got {t0:g} to {t1:g} s"
         )
-    return log.part(slice(begin, end))
+    return log[begin:end]
 
 
 def period(log: Log) -> float:
@@ -91,13 +91,6 @@ def has_condition(log: Log, robot: int) -> bool:
     return bool((log.threshold[:, robot] > 0).any())
 
 
-def forward_speed(log: Log, robot: int) -> Float[np.ndarray, " T"]:
-    """Velocity of the base along its own x axis [m/s]: what the command asks for."""
-    w, x, y, z = log.qpos[:, robot, 3:7].T
-    forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
-    return np.einsum("ti,ti->t", forward, log.qvel[:, robot, :3])
-
-
 def ground_of(log: Log) -> Terrain:
     """The ground that the log keeps."""
     return Terrain(
@@ -110,19 +103,19 @@ def ground_of(log: Log) -> Terrain:
 
 def walks_on_kept_ground(log: Log, robot: int) -> bool:
     """Whether the ground that the log keeps is this robot's: of several it keeps the first."""
-    kept = ground_of(log).height_at(log.foot_position_w[:, robot, :, :2])
+    kept = ground_of(log).height_at(log.truth.foot_position_w[:, robot, :, :2])
     return bool(np.allclose(kept, _ground_below_feet(log, robot), atol=_SAME_GROUND))
 
 
 def ground_below(log: Log, robot: int) -> Float[np.ndarray, " T"]:
     """Height of the ground below the base [m]; if the log does not keep it, below the feet."""
     if walks_on_kept_ground(log, robot):
-        return ground_of(log).height_at(log.qpos[:, robot, :2])
+        return ground_of(log).height_at(log.truth.base_position_w[:, robot, :2])
     return _ground_below_feet(log, robot).mean(axis=1)
 
 
 def _ground_below_feet(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
-    return log.foot_position_w[:, robot, :, 2] - log.clearance[:, robot]
+    return log.truth.foot_position_w[:, robot, :, 2] - log.truth.clearance[:, robot]
 
 
 def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:

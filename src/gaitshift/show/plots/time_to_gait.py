@@ -12,8 +12,16 @@ from matplotlib.ticker import NullLocator
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.benchmark.outcome import Outcome, middle, ratio, ratio_text
-from gaitshift.show.plots.palette import INK, PALE, PAPER, QUIET, gait_colours
-from gaitshift.show.plots.style import check_target, house_style, save
+from gaitshift.show.plots.style import (
+    INK,
+    PALE,
+    PAPER,
+    QUIET,
+    check_target,
+    gait_colours,
+    house_style,
+    save,
+)
 
 _WIDTH, _LANE, _MARGINS = 7.5, 1.15, 0.95
 """Of the figure, of a gait's lane, and of what is above and below all lanes [inch]."""

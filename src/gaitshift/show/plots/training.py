@@ -3,7 +3,6 @@
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -15,8 +14,17 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.show.plots.palette import INK, PALE, QUIET
-from gaitshift.show.plots.style import check_target, few_ticks, house_style, name_row, save
+from gaitshift.show.plots.style import (
+    INK,
+    PALE,
+    QUIET,
+    check_target,
+    few_ticks,
+    house_style,
+    name_row,
+    save,
+)
+from gaitshift.table import read
 
 COURSES = (
     ("reward", 1.0, "reward [per control step]"),
@@ -73,11 +81,7 @@ def read_progress(path: Path) -> list[dict[str, str]]:
     Raises:
         GaitshiftError: no such file, not a `progress.csv`, or fewer than two iterations.
     """
-    try:
-        with path.open(newline="") as file:
-            table = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError) as error:
-        raise GaitshiftError(f"{path} cannot be read: {error}") from error
+    table = read(path, may_be_cut=True)
     if len(table) < 2:
         raise GaitshiftError(f"{path} must have 2 iterations or more to draw, got {len(table)}")
     missing = [column for column in _NEEDED if column not in table[0]]

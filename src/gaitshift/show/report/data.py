@@ -8,18 +8,17 @@ from jaxtyping import Float, Shaped
 
 from gaitshift.gait import gaits
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import Robot
 from gaitshift.robot.legs import LEGS
 from gaitshift.show.geometry import Shape, frames_of, ground_grid, plane_corners
-from gaitshift.show.plots.palette import GROUND, LEG_COLOURS, gait_colours
 from gaitshift.show.plots.signals import (
-    forward_speed,
     ground_below,
     ground_of,
     has_condition,
     period,
     shift_times,
 )
+from gaitshift.show.plots.style import GROUND, LEG_COLOURS, gait_colours
 from gaitshift.sim.terrain import Terrain
 
 EVERY = 2
@@ -31,8 +30,8 @@ _AROUND = 3.0
 _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
 
 
-def run_data(log: Log, robot: int) -> dict[str, Any]:
-    """One robot of a log.
+def run_data(log: Log, robot: int, description: Robot) -> dict[str, Any]:
+    """One robot of a log of such robots.
 
     `time` [s], `contact` (bit i: foot i of `LEGS` is down) and `gait` have an entry a control step;
     `position` and `rotation` (w, x, y, z) of each of the `bodies`, `feet` and the corners of the
@@ -40,12 +39,13 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
     """
     alone = log.robots(slice(robot, robot + 1))
     frames = frames_of(alone, EVERY)
-    shape = Shape(ROBOTS[log.robot])
-    position, rotation = shape.poses(np.concatenate([frame.qpos for frame in frames]))
-    feet = np.concatenate([frame.foot_position_w for frame in frames])
-    feet[..., 2] += ROBOTS[log.robot].foot_radius
+    shape = Shape(description)
+    position, rotation = shape.poses(np.concatenate([frame.step.qpos for frame in frames]))
+    place = alone.truth.base_position_w[:, 0, :2].astype(float)
+    feet = np.concatenate([frame.step.truth.foot_position_w for frame in frames])
+    feet[..., 2] += description.foot_radius
     planes = [_plane(frame.touch_w[0]) for frame in frames]
-    bits = (alone.contact[:, 0] * (1 << np.arange(len(LEGS)))).sum(axis=1)
+    bits = (alone.sensed.contact[:, 0] * (1 << np.arange(len(LEGS)))).sum(axis=1)
     return {
         "time": packed(log.time, "f4"),
         "period": period(log),
@@ -58,7 +58,7 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
             for name, colour in gait_colours(log.gaits).items()
         ],
         "shifts": shift_times(log, robot),
-        "footRadius": ROBOTS[log.robot].foot_radius,
+        "footRadius": description.foot_radius,
         "bodies": [
             {
                 "name": body.name,
@@ -72,7 +72,7 @@ def run_data(log: Log, robot: int) -> dict[str, Any]:
         "rotation": packed(rotation.swapaxes(0, 1), "f4"),
         "feet": packed(feet, "f4"),
         "plane": packed(np.array(planes), "f4"),
-        "ground": _ground(_around(ground_of(log), alone.qpos[:, 0, :2].astype(float))),
+        "ground": _ground(_around(ground_of(log), place)),
         "rows": _rows(log, robot),
     }
 
@@ -106,11 +106,12 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
                 zero=True,
             ),
         ]
+    asked = log.sensed.need("forward_speed_command", "the page")[:, robot]
     speeds = [
-        series("speed", forward_speed(log, robot), "ink"),
-        series("command", log.command[:, robot, 0], "#0072b2"),
+        series("speed", log.truth.forward_speed[:, robot], "ink"),
+        series("command", asked, "#0072b2"),
     ]
-    base, below = log.qpos[:, robot, 2], ground_below(log, robot)
+    base, below = log.truth.base_position_w[:, robot, 2], ground_below(log, robot)
     levels = [series("ground", below, GROUND, fill=True), series("base", base, "ink")]
     rows += [
         lines("forward speed [m/s]", speeds, unit="m/s", digits=2),
@@ -121,8 +122,7 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
 
 def _since_touched(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
     """Heights of the last touches; NaN of a foot that has not touched yet."""
-    touched = np.logical_or.accumulate(log.contact[:, robot], axis=0)
-    return np.where(touched, log.foot_height[:, robot], np.nan)
+    return log.touch_height[:, robot]
 
 
 def lines(

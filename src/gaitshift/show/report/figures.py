@@ -57,7 +57,7 @@ class Axis:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Kind:
+class Category:
     """Cells that have no shade but the colour of their kind."""
 
     name: str
@@ -102,7 +102,7 @@ def heat_map(
     span: tuple[float, float],
     stops: Sequence[str],
     kind: Int[np.ndarray, "Y X"],
-    kinds: Sequence[Kind],
+    kinds: Sequence[Category],
     says: Sequence[Said],
     chosen: tuple[int, int] | None = None,
     words: Sequence[str] | None = None,

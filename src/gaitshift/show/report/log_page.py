@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.gait_analysis import measure, robot_mass
+from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.show.plots.signals import check_robot, fall_time, gait_spans, shift_times
 from gaitshift.show.report.data import run_data, title_of
 from gaitshift.show.report.page import Row, facts_table, table, write_page
@@ -29,6 +28,7 @@ def write_report(
     path: Path,
     *,
     robot: int = 0,
+    description: Robot = ANYMAL_B,
     video: Path | None = None,
     facts: Mapping[str, str] | None = None,
 ) -> None:
@@ -38,14 +38,15 @@ def write_report(
         log: the run.
         path: the HTML file.
         robot: whose run.
+        description: of the robots of the log.
         video: an mp4 to show beside it, where it is not too large.
         facts: what made the run, in words, by name.
 
     Raises:
-        GaitshiftError: a robot that is not in the log, or one of an unknown kind.
+        GaitshiftError: a robot that is not in the log, or a log of another kind of robot.
     """
     check_robot(log, robot)
-    check_kind(log)
+    description.check_is(log.robot, "the log")
     spans = gait_spans(log, robot)
     title = " → ".join(title_of(name) for name, _ in spans[:8]) + (" → …" if spans[8:] else "")
     known = {"ground": log.terrain, "robot": log.robot, "seen": f"robot {robot + 1} of {_n(log)}"}
@@ -53,22 +54,14 @@ def write_report(
         path,
         title=title,
         summary=_summary(log, robot),
-        walks=[("", run_data(log, robot))],
+        walks=[("", run_data(log, robot, description))],
         sections=[
-            ("Gaits", table(STRETCH_HEAD, stretches(log, robot))),
+            ("Gaits", table(STRETCH_HEAD, stretches(log, robot, description))),
             ("Shifts", table(_SHIFT_HEAD, _shifts(log, robot)) or "<p>No shift.</p>"),
             ("Film", _video(video)),
             ("Settings", facts_table(known, facts)),
         ],
     )
-
-
-def check_kind(log: Log) -> None:
-    """Raises `GaitshiftError` where the robot of a log is of an unknown kind."""
-    if log.robot not in ROBOTS:
-        raise GaitshiftError(
-            f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
-        )
 
 
 STRETCH_HEAD = ("gait", "from", "to", "gait by contacts", "speed", "pattern", "misses")
@@ -78,7 +71,10 @@ _SHIFT_HEAD = ("at", "where", "from", "to", "k")
 def _summary(log: Log, robot: int) -> str:
     fell = fall_time(log, robot)
     seconds = float(log.time[-1]) if fell is None else fell
-    way = float(log.qpos[np.searchsorted(log.time, seconds) - 1, robot, 0] - log.qpos[0, robot, 0])
+    way = float(
+        log.truth.base_position_w[np.searchsorted(log.time, seconds) - 1, robot, 0]
+        - log.truth.base_position_w[0, robot, 0]
+    )
     count = len(shift_times(log, robot))
     shifts = "no shift of gait" if count == 0 else f"{count} shift{'s' * (count > 1)} of gait"
     end = "no fall" if fell is None else f"fall after {fell:.1f} s"
@@ -90,14 +86,14 @@ def _shifts(log: Log, robot: int) -> list[Row]:
     for (before, _), (after, span) in zip(
         gait_spans(log, robot), gait_spans(log, robot)[1:], strict=False
     ):
-        x = float(log.qpos[span.entry, robot, 0])
+        x = float(log.truth.base_position_w[span.entry, robot, 0])
         k = f"{log.k[span.entry, robot]:.4g} of {log.threshold[span.entry, robot]:.4g}"
         cells = (f"{span.begin:.2f} s", f"{x:.2f} m", title_of(before), title_of(after), k)
         rows.append((cells, max(span.begin - 1.0, 0.0)))
     return rows
 
 
-def stretches(log: Log, robot: int) -> list[Row]:
+def stretches(log: Log, robot: int, description: Robot) -> list[Row]:
     """A row for each stretch in one gait: its verdict, and when it begins."""
     rows: list[Row] = []
     alone = log.robots(slice(robot, robot + 1))
@@ -108,7 +104,7 @@ def stretches(log: Log, robot: int) -> list[Row]:
             rows.append(((*cells, "too short to judge", "", "", ""), span.begin))
             continue
         end = int(np.searchsorted(log.time, span.end - 1e-9))
-        figures = _judged(alone.part(slice(span.entry, end)), machines)
+        figures = _judged(alone[span.entry : end], machines, description)
         verdict, misses = figures["verdict"], [m["figure"] for m in figures["verdict"]["misses"]]
         named = title_of(verdict["gait"]) if verdict["gait"] != "none" else "no gait"
         cells += [f"{named}{', clean' if verdict['clean'] else ''}"]
@@ -117,10 +113,11 @@ def stretches(log: Log, robot: int) -> list[Row]:
     return rows
 
 
-def _judged(stretch: Log, machines: Mapping[str, Any]) -> dict[str, Any]:
+def _judged(stretch: Log, machines: Mapping[str, Any], robot: Robot) -> dict[str, Any]:
     """Figures of a stretch, its time counted from its beginning."""
-    moved = replace(stretch, time=stretch.time - float(stretch.time[0]))
-    return measure(moved, machines, mass=robot_mass(stretch.robot), warm_up=1.0)
+    since = stretch.time - float(stretch.time[0])
+    moved = replace(stretch, sensed=replace(stretch.sensed, time=since))
+    return measure(moved, machines, robot, warm_up=1.0)
 
 
 def _video(path: Path | None) -> str:

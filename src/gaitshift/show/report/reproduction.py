@@ -7,13 +7,19 @@ from typing import Any
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.reproduction import tables
-from gaitshift.lab.reproduction.courses import HELD_FOR, WALKING_CHANGES, WALKING_SPEED
 from gaitshift.lab.reproduction.findings import Finding, findings
-from gaitshift.lab.reproduction.judging import Judged, judge
-from gaitshift.lab.reproduction.results import Results
+from gaitshift.lab.reproduction.judging import JudgedPolicy, judge
+from gaitshift.lab.reproduction.learning_curve import HELD_FOR, WALKING_CHANGES, WALKING_SPEED
+from gaitshift.lab.reproduction.results import (
+    CURVES_FILE,
+    GAITS_FILE,
+    RUNS_FILE,
+    EarlierRuns,
+    Results,
+)
 from gaitshift.lab.reproduction.settings import LOCKOUT
-from gaitshift.lab.reproduction.told import CURVES, GAITS, RUNS, Told
 from gaitshift.show.plots import reproduction as figures
+from gaitshift.table import Row, markdown, write
 
 README = "README.md"
 
@@ -27,7 +33,7 @@ def write_report(
     results: Results,
     runs: Path,
     out: Path,
-    told: Told | None = None,
+    earlier: EarlierRuns | None = None,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
     """Writes all that the runs at hand say into `out`; gives the same as plain data.
@@ -36,24 +42,24 @@ def write_report(
         results: the runs that are over.
         runs: their folders.
         out: the folder of the report.
-        told: runs that an earlier report tells of, whose folders may be gone.
+        earlier: runs in the tables of an earlier report, whose folders may be gone.
         report: called with the policies judged and those in all.
     """
     if not results.seeds:
         raise GaitshiftError(f"{runs} must hold at least one finished run, got none")
     out.mkdir(parents=True, exist_ok=True)
-    judged = judge(results, runs, told or Told(), report)
+    judged = judge(results, runs, earlier or EarlierRuns(), report)
     found = findings(results)
     gaits, ablations = tables.gait_rows(judged), tables.ablation_rows(results)
     parts = {
-        RUNS: tables.run_rows(results),
-        GAITS: gaits,
+        RUNS_FILE: tables.run_rows(results),
+        GAITS_FILE: gaits,
         tables.ABLATED_RUNS: ablations,
-        CURVES: list(tables.curve_rows(results)),
+        CURVES_FILE: list(tables.curve_rows(results)),
     }
     written = [name for name, rows in parts.items() if rows]
     for name in written:
-        tables.write(parts[name], out / name)
+        write(out / name, parts[name])
     written += figures.draw(results, judged, out)
     (out / README).write_text(_readme(results, found, judged, ablations, written))
     return {
@@ -68,8 +74,8 @@ def write_report(
 def _readme(
     results: Results,
     found: list[Finding],
-    judged: list[Judged],
-    ablations: list[tables.Row],
+    judged: list[JudgedPolicy],
+    ablations: list[Row],
     written: list[str],
 ) -> str:
     parts = ["# Reproduction of the paper", _introduction(results)]
@@ -120,10 +126,10 @@ def _introduction(results: Results) -> str:
 
 
 def _verdicts(found: list[Finding]) -> str:
-    return _table(("statement", "verdict"), [(f.name, f"**{f.verdict}**") for f in found])
+    return markdown(("statement", "verdict"), [(f.name, f"**{f.verdict}**") for f in found])
 
 
-def _gait_table(judged: list[Judged]) -> str:
+def _gait_table(judged: list[JudgedPolicy]) -> str:
     head = (
         "gait",
         "seed",
@@ -135,7 +141,7 @@ def _gait_table(judged: list[Judged]) -> str:
         "touchdowns per cycle",
         "cost of transport",
     )
-    return _table(
+    return markdown(
         head,
         [
             (
@@ -149,7 +155,7 @@ def _gait_table(judged: list[Judged]) -> str:
     )
 
 
-def _ablation_table(rows: list[tables.Row]) -> str:
+def _ablation_table(rows: list[Row]) -> str:
     columns = {
         "group": "question",
         "label": "setting",
@@ -162,15 +168,10 @@ def _ablation_table(rows: list[tables.Row]) -> str:
         "late_stance_fraction": "share of steps with the stance of the state",
     }
     shown = [{**row, "walking": f"{row['walking']} of {row['seeds']}"} for row in rows]
-    return _table(
+    return markdown(
         tuple(columns.values()),
         [tuple(_text(row[key], "never") for key in columns) for row in shown],
     )
-
-
-def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _text(value: str | float | None, nothing: str = "–") -> str:
@@ -178,5 +179,5 @@ def _text(value: str | float | None, nothing: str = "–") -> str:
         return nothing
     if isinstance(value, str):
         return value
-    told = round(value, 2)  # first, or 4.9999 is told as 5.00 and, read back from a table, as 5
-    return f"{told:g}" if told == int(told) else f"{told:.2f}"
+    rounded = round(value, 2)  # or 4.9999 stands as 5.00 and, read back from a table, as 5
+    return f"{rounded:g}" if rounded == int(rounded) else f"{rounded:.2f}"

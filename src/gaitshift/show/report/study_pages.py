@@ -17,13 +17,13 @@ from gaitshift.lab.identification.report import (
     course_rows,
     hardest_first,
 )
-from gaitshift.lab.studies.transition_page import HEAD, row_cells
-from gaitshift.lab.table import Row
+from gaitshift.lab.studies.transition_table import HEAD, row_cells
 from gaitshift.show.plots.identification import FALSE, LATEST, LINES, NOTICED, OTHERS, roc
-from gaitshift.show.plots.palette import gait_colours
+from gaitshift.show.plots.style import gait_colours
 from gaitshift.show.report.data import title_of
-from gaitshift.show.report.figures import Axis, Curve, Kind, Said, curves, heat_map
+from gaitshift.show.report.figures import Axis, Category, Curve, Said, curves, heat_map
 from gaitshift.show.report.page import facts_table, figure, table, write_page
+from gaitshift.table import Row
 
 _NOTICED = {
     "rough": "rough ground against others",
@@ -31,8 +31,8 @@ _NOTICED = {
 }
 """What ROC curves are about, by what is to be noticed."""
 
-_FALSE = Kind(name="false shifts", colour=FALSE)
-_MISSED = Kind(name="most passages missed", colour="pale")
+_FALSE = Category(name="false shifts", colour=FALSE)
+_MISSED = Category(name="most passages missed", colour="pale")
 
 
 def write_identification_page(
@@ -187,7 +187,10 @@ def _transition_map(rows: Sequence[Row]) -> dict[str, Any]:
         span=(0.0, 1.0),
         stops=("#f7e3d6", "#d55e00", "#7a2f00"),
         kind=kind,
-        kinds=(Kind(name="none failed", colour="#cfe3d6"), Kind(name="not tried", colour="pale")),
+        kinds=(
+            Category(name="none failed", colour="#cfe3d6"),
+            Category(name="not tried", colour="pale"),
+        ),
         says=[Said(name=name, values=values) for name, values in told.items()],
         words=words,
     )

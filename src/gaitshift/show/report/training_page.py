@@ -1,6 +1,5 @@
 """The page of a training: what its policies do, its course, its verdicts."""
 
-import csv
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,14 +7,22 @@ from typing import Any
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
+from gaitshift.robot.description import Robot
 from gaitshift.show.plots.training import COURSES, numbers, read_progress
 from gaitshift.show.report.data import lines, packed, run_data, series
-from gaitshift.show.report.log_page import STRETCH_HEAD, check_kind, stretches
+from gaitshift.show.report.log_page import STRETCH_HEAD, stretches
 from gaitshift.show.report.page import Row, facts_table, table, write_page
+from gaitshift.table import read
 
 
 def write_training_report(
-    folder: Path, path: Path, walks: Sequence[tuple[str, Log]], *, title: str, summary: str
+    folder: Path,
+    path: Path,
+    walks: Sequence[tuple[str, Log]],
+    robot: Robot,
+    *,
+    title: str,
+    summary: str,
 ) -> None:
     """Writes the page of a training: its walks to choose from, its course, its verdicts.
 
@@ -23,6 +30,7 @@ def write_training_report(
         folder: the run; its `progress.csv` and, where there are any, `verdicts.csv` are shown.
         path: the HTML file.
         walks: what policies of the run do, by name; the first robot of each log is shown.
+        robot: what walks in them.
         title: what was trained.
         summary: a sentence on it.
 
@@ -30,23 +38,23 @@ def write_training_report(
         GaitshiftError: a file of the run that cannot be read.
     """
     for _, log in walks:
-        check_kind(log)
+        robot.check_is(log.robot, "the log")
     write_page(
         path,
         title=title,
         summary=summary,
-        walks=[(name, run_data(log, 0)) for name, log in walks],
+        walks=[(name, run_data(log, 0, robot)) for name, log in walks],
         course=_course(folder / "progress.csv"),
         sections=[
-            ("Walks at checkpoints", table(("policy", *STRETCH_HEAD), _walks(walks))),
+            ("Walks at checkpoints", table(("policy", *STRETCH_HEAD), _walks(walks, robot))),
             ("Verdicts at checkpoints, on flat ground", _verdicts(folder / "verdicts.csv")),
             ("Settings", facts_table(_facts(folder / "config.json"))),
         ],
     )
 
 
-def _walks(walks: Sequence[tuple[str, Log]]) -> list[Row]:
-    return [((name, *cells), None) for name, log in walks for cells, _ in stretches(log, 0)]
+def _walks(walks: Sequence[tuple[str, Log]], robot: Robot) -> list[Row]:
+    return [((name, *cells), None) for name, log in walks for cells, _ in stretches(log, 0, robot)]
 
 
 def _course(progress: Path) -> dict[str, Any]:
@@ -71,8 +79,7 @@ def _verdicts(path: Path) -> str:
     """The verdicts that the training wrote down on its way, if it did."""
     if not path.is_file():
         return ""
-    with path.open(newline="") as file:
-        found = list(csv.DictReader(file))
+    found = read(path, may_be_cut=True)
     if not found:
         return ""
     head = tuple(name.replace("_", " ") for name in found[0])

@@ -1,4 +1,4 @@
-"""Pictures of a model, drawn by OpenGL into arrays, on machines with and without a screen."""
+"""Pictures of a model, drawn by OpenGL into arrays, and the camera that follows a robot."""
 
 import os
 import sys
@@ -11,6 +11,8 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.log import Log
+from gaitshift.show.plots.signals import period, smoothed
 
 _MAX_GEOMS = 2000
 
@@ -25,7 +27,7 @@ class VideoUnavailable(GaitshiftError):  # noqa: N818  a state of the machine, n
 
 
 @dataclass(frozen=True, kw_only=True)
-class View:
+class Camera:
     """Where a camera stands and looks."""
 
     target: tuple[float, float, float]
@@ -88,18 +90,15 @@ class Canvas:
         mujoco.mjr_uploadTexture(self._model, self._context, texture)
 
     def draw(
-        self, data: mujoco.MjData, view: View, balls: Sequence[Ball] = ()
+        self, data: mujoco.MjData, camera: Camera, balls: Sequence[Ball] = ()
     ) -> UInt8[np.ndarray, "height width 3"]:
-        """The model at `data`, seen from `view`: rows from the top, red, green, blue."""
-        camera = mujoco.MjvCamera()
-        camera.lookat[:] = view.target
-        camera.distance, camera.azimuth, camera.elevation = (
-            view.distance,
-            view.azimuth,
-            view.elevation,
-        )
+        """The model at `data`, seen by `camera`: rows from the top, red, green, blue."""
+        placed = mujoco.MjvCamera()
+        placed.lookat[:] = camera.target
+        placed.distance, placed.azimuth = camera.distance, camera.azimuth
+        placed.elevation = camera.elevation
         every = mujoco.mjtCatBit.mjCAT_ALL.value
-        mujoco.mjv_updateScene(self._model, data, self._options, None, camera, every, self._scene)
+        mujoco.mjv_updateScene(self._model, data, self._options, None, placed, every, self._scene)
         for ball in balls:
             self._add(ball)
         mujoco.mjr_render(self._rect, self._scene, self._context)
@@ -135,3 +134,35 @@ def _open_context(width: int, height: int) -> Any:
 
 def _first_line(error: Exception) -> str:
     return (str(error).strip() or type(error).__name__).splitlines()[0]
+
+
+_DISTANCE = 2.25
+"""[m]: the robot fills about a quarter of the picture's width."""
+
+_AZIMUTH, _ELEVATION = 58.0, -18.0
+"""Seen from its right and a little from behind, so that the ground ahead is in the picture."""
+
+_LOWER = 0.14
+"""How far below the base the middle of the picture is [m]: half-way to the feet."""
+
+_ALONG, _UP, _TURN = 0.5, 1.0, 1.5
+"""Windows that the course is smoothed in, over the ground, in height and in heading [s]: longer
+than a stride, so that the camera does not bob with the body."""
+
+
+def follow(log: Log, robot: int) -> list[Camera]:
+    """The camera that walks along with a robot, calmly, at each entry of the log."""
+    step = period(log)
+    x, y, z = log.truth.base_position_w[:, robot, :3].T
+    yaw = smoothed(np.unwrap(log.sensed.yaw[:, robot]), step, _TURN)
+    course = zip(
+        smoothed(x, step, _ALONG).tolist(),
+        smoothed(y, step, _ALONG).tolist(),
+        (smoothed(z, step, _UP) - _LOWER).tolist(),
+        (_AZIMUTH + np.degrees(yaw)).tolist(),
+        strict=True,
+    )
+    return [
+        Camera(target=(cx, cy, cz), distance=_DISTANCE, azimuth=azimuth, elevation=_ELEVATION)
+        for cx, cy, cz, azimuth in course
+    ]

@@ -1,7 +1,5 @@
-"""MP4 files: pictures in, pictures out, by the ffmpeg that imageio brings."""
+"""MP4 files: pictures in, by the ffmpeg that imageio brings."""
 
-import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
@@ -61,23 +59,3 @@ class FilmWriter:
             self._part.replace(self._path)
         else:
             self._part.unlink(missing_ok=True)
-
-
-def read_film(path: Path) -> Iterator[UInt8[np.ndarray, "height width 3"]]:
-    """The pictures of a video, one after the other; `GaitshiftError` where it cannot be read."""
-    if not path.is_file():
-        raise GaitshiftError(f"no video file {path}")
-    ffmpeg = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(path)]
-    command = [*ffmpeg, "-f", "image2pipe", "-c:v", "ppm", "-"]
-    # imageio's own reader leaves its pipes open.
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
-        assert process.stdout is not None
-        empty = True
-        while process.stdout.readline() == b"P6\n":
-            width, height = (int(word) for word in process.stdout.readline().split())
-            process.stdout.readline()
-            pixels = process.stdout.read(3 * width * height)
-            yield np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)
-            empty = False
-    if empty:
-        raise GaitshiftError(f"{path} must be a video that ffmpeg can read")

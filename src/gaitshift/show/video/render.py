@@ -3,24 +3,90 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import mujoco
 import numpy as np
+from jaxtyping import UInt8
+from PIL import ImageColor
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
-from gaitshift.robot.description import ROBOTS
-from gaitshift.show.plots.palette import gait_colours
+from gaitshift.robot.description import ANYMAL_B, Robot
+from gaitshift.robot.legs import LEGS
 from gaitshift.show.plots.signals import (
     check_robot,
-    forward_speed,
     gait_at,
+    ground_of,
     period,
     smoothed,
     walks_on_kept_ground,
     window,
 )
+from gaitshift.show.plots.style import gait_colours
+from gaitshift.show.video.canvas import Ball, Canvas, follow
 from gaitshift.show.video.film import FilmWriter
-from gaitshift.show.video.playback import Playback
+from gaitshift.show.video.scene import Paint, build_scene
 from gaitshift.show.video.strip import Reading, Strip
+
+_GLOW = 1.3
+"""Radius of the light on a foot that touches, of the foot's own."""
+
+
+class Playback:
+    """Draws one robot of a log. A context manager: OpenGL's memory is freed at its end."""
+
+    def __init__(self, log: Log, robot: int, description: Robot, width: int, height: int) -> None:
+        self._log, self._robot = log, robot
+        self._qpos = log.qpos[:, robot]
+        self._radius = description.foot_radius
+        self._colours = gait_colours(log.gaits)
+        place = log.truth.base_position_w[:, robot, :2]
+        scene = build_scene(description, ground_of(log), place, width, height)
+        self._texture = scene.texture
+        self._model, self._data = scene.model, mujoco.MjData(scene.model)
+        self._paint = Paint(scene)
+        self._cameras = follow(log, robot)
+        self._printed = 0
+        self._canvas = Canvas(scene.model, width, height)
+
+    def __enter__(self) -> "Playback":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._canvas.close()
+
+    def picture(self, entry: int) -> UInt8[np.ndarray, "height width 3"]:
+        """The robot at an entry, the prints of all touches up to it on the ground."""
+        self._data.qpos[:] = self._qpos[entry]
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        self._print_touches(entry)
+        self._paint.move_shadow(self._model, self._data)
+        self._canvas.upload_texture(self._texture)
+        return self._canvas.draw(self._data, self._cameras[entry], self._lights(entry))
+
+    def _print_touches(self, entry: int) -> None:
+        """Leaves the prints of the touches since the last picture."""
+        contact = self._log.sensed.contact[:, self._robot]
+        for now in range(self._printed, entry + 1):
+            touching = contact[now] & ~contact[now - 1] if now else contact[now]
+            for leg in np.flatnonzero(touching).tolist():
+                xy = self._log.truth.foot_position_w[now, self._robot, leg, :2]
+                self._paint.add_footprint(xy, self._colour(now))
+        self._printed = entry + 1
+
+    def _lights(self, entry: int) -> list[Ball]:
+        """A light on each foot that touches, in the gait's colour."""
+        feet = self._log.truth.foot_position_w[entry, self._robot] + [0.0, 0.0, self._radius]
+        red, green, blue = (v / 255 for v in ImageColor.getrgb(self._colour(entry))[:3])
+        return [
+            Ball(position=feet[leg], radius=_GLOW * self._radius, rgba=(red, green, blue, 1.0))
+            for leg in range(len(LEGS))
+            if self._log.sensed.contact[entry, self._robot, leg]
+        ]
+
+    def _colour(self, entry: int) -> str:
+        return self._colours[gait_at(self._log, self._robot, entry)]
+
 
 _SPEED_SIGMA = 0.3
 """Of the window over the speed that is told [s]: a number that trembles cannot be read."""
@@ -34,6 +100,7 @@ def render(
     path: Path,
     robot: int = 0,
     *,
+    description: Robot = ANYMAL_B,
     width: int = 1280,
     height: int = 720,
     fps: int = 30,
@@ -41,7 +108,7 @@ def render(
     t1: float = float("inf"),
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Writes an MP4 video (H.264) of one robot from `t0` to `t1` [s].
+    """Writes an MP4 video (H.264) of one robot from `t0` to `t1` [s], in a log of such robots.
 
     Feet that touch glow in the colour of the gait and leave prints; the strip below tells the gait,
     k against its threshold, the forward speed and the time. `report` is called with the pictures
@@ -49,17 +116,18 @@ def render(
 
     Raises:
         VideoUnavailable: no OpenGL, or no ffmpeg, on this machine.
-        GaitshiftError: no such robot, nothing in that time, a robot whose ground the log does not
-            keep, a size or rate that makes no video, another file ending, or no such folder.
+        GaitshiftError: no such robot, a log of another kind of robot, nothing in that time, a
+            robot whose ground the log does not keep, a size or rate that makes no video, another
+            file ending, or no such folder.
     """
     _check_target(path, width, height, fps)
-    _check_log(log, robot)
+    _check_log(log, robot, description)
     log = window(log, t0, t1)
     entries = _entries(log, fps)
     readings = _readings(log, robot)
     strip = Strip(width, height)
     with (
-        Playback(log, robot, width, height - strip.height) as playback,
+        Playback(log, robot, description, width, height - strip.height) as playback,
         FilmWriter(path, width, height, fps) as film,
     ):
         for done, entry in enumerate(entries):
@@ -80,12 +148,9 @@ def _check_target(path: Path, width: int, height: int, fps: int) -> None:
         raise GaitshiftError(f"fps must be 1 to 120, got {fps}")
 
 
-def _check_log(log: Log, robot: int) -> None:
+def _check_log(log: Log, robot: int, description: Robot) -> None:
     check_robot(log, robot)
-    if log.robot not in ROBOTS:
-        raise GaitshiftError(
-            f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
-        )
+    description.check_is(log.robot, "the log")
     if not walks_on_kept_ground(log, robot):
         raise GaitshiftError(
             f"robot must be 0 where robots have different terrains, as the log keeps only that of "
@@ -102,7 +167,7 @@ def _entries(log: Log, fps: int) -> list[int]:
 def _readings(log: Log, robot: int) -> list[Reading]:
     """What the strip tells at each entry."""
     colours = gait_colours(log.gaits)
-    speed = smoothed(forward_speed(log, robot), period(log), _SPEED_SIGMA)
+    speed = smoothed(log.truth.forward_speed[:, robot], period(log), _SPEED_SIGMA)
     gaits = [gait_at(log, robot, entry) for entry in range(len(log.time))]
     return [
         Reading(

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from gaitshift.show.plots.palette import INK, PAPER, QUIET
+from gaitshift.show.plots.style import INK, PAPER, QUIET
 
 _SHARE = 0.125
 """Height of the strip, of the whole picture."""

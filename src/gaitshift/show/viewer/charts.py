@@ -1,6 +1,7 @@
-"""The charts beside the scene: k and β, foot heights, speed, contacts, and the gait's machine."""
+"""The charts beside the scene: the last seconds of a robot, and its gait's machine."""
 
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any, cast
 
@@ -9,8 +10,54 @@ import viser
 
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.legs import LEGS
-from gaitshift.show.plots.palette import INK, LEG_COLOURS, PALE, QUIET, gait_colours
-from gaitshift.show.viewer.tape import WINDOW, Tape
+from gaitshift.show.geometry import Frame
+from gaitshift.show.plots.style import INK, LEG_COLOURS, PALE, QUIET, gait_colours
+
+_QUANTITIES: dict[str, Callable[[Frame], np.ndarray]] = {
+    "contact": lambda frame: frame.step.sensed.contact,
+    "touch_height": lambda frame: frame.touch_height,
+    "speed": lambda frame: frame.step.truth.forward_speed,
+    "k": lambda frame: frame.step.k,
+    "threshold": lambda frame: frame.step.threshold,
+    "gait": lambda frame: frame.step.gait,
+    "machine_state": lambda frame: frame.step.machine_state,
+}
+"""What charts show, by name."""
+
+WINDOW = 8.0
+"""Charts show this much of the past [s]."""
+
+
+class Tape:
+    """The last seconds of one robot, for charts."""
+
+    def __init__(self, robot: int = 0) -> None:
+        self.robot = robot
+        self._frames: deque[Frame] = deque()
+
+    def add(self, frame: Frame) -> None:
+        """Takes in a frame; what is older than the window, or comes later, is let go."""
+        while self._frames and self._frames[-1].time >= frame.time:
+            self._frames.pop()  # the run began anew, or the slider was moved back
+        self._frames.append(frame)
+        while self._frames[0].time < frame.time - WINDOW:
+            self._frames.popleft()
+
+    def clear(self) -> None:
+        """Lets all of it go."""
+        self._frames.clear()
+
+    @property
+    def last(self) -> Frame | None:
+        """The newest frame."""
+        return self._frames[-1] if self._frames else None
+
+    def of(self, name: str) -> np.ndarray:
+        """A quantity of the robot over the window, time first; of `time` itself: [s]."""
+        if name == "time":
+            return np.array([frame.time for frame in self._frames])
+        return np.array([_QUANTITIES[name](frame)[self.robot] for frame in self._frames])
+
 
 _HEIGHT = 150
 """Of a chart [pixels]."""
@@ -50,7 +97,7 @@ class Charts:
         self._counter.data = (time, *counter(tape))
         self._heights.data = (time, *foot_heights(tape).T)
         self._speed.data = (time, tape.of("speed").astype(float))
-        gait, state = int(last.gait[tape.robot]), int(last.machine_state[tape.robot])
+        gait, state = int(last.step.gait[tape.robot]), int(last.step.machine_state[tape.robot])
         machine = self._machines[gait]
         self._machine.content = (
             "" if machine is None else machine_svg(machine, state, self._colours[gait])
@@ -93,8 +140,7 @@ def counter(tape: Tape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def foot_heights(tape: Tape) -> np.ndarray:
     """Heights of the last touches (T, 4) [m]; NaN of a foot that has not touched yet."""
-    touched = np.isfinite(tape.of("touch_w")[..., 0])
-    return np.where(touched, tape.of("foot_height"), np.nan)
+    return tape.of("touch_height")
 
 
 def contact_svg(tape: Tape, colours: tuple[str, ...]) -> str:

@@ -10,11 +10,12 @@ from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.lab.evaluation.demo import RUN_OUT, START, WIDTH, DemoConfig
-from gaitshift.lab.evaluation.rollout import Recorder, RolloutConfig, Walk
+from gaitshift.lab.evaluation.rollout import Recorder, RolloutConfig, Walk, step_of
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
-from gaitshift.shift import Condition, GaitGraph
-from gaitshift.show.geometry import Frame, last_touches
+from gaitshift.shift import GaitGraph, Oracle, between, load_graph, tuned
+from gaitshift.shift.graph_file import DEFAULT
+from gaitshift.show.geometry import Frame
 from gaitshift.sim.terrain import from_spec
 from gaitshift.sim.world import World
 
@@ -42,8 +43,10 @@ class LiveConfig:
     """The gait at the start, and the one for flat ground."""
     rough_gait: str = "bound"
     """The gait for rough ground."""
-    condition: Condition = field(default_factory=Condition)
-    """When to shift."""
+    condition: str = DEFAULT
+    """When to shift, by the name of a shipped graph of two gaits."""
+    numbers: Mapping[str, float] = field(default_factory=dict[str, float])
+    """Numbers of the condition that are others than in its file (`shift.there_and_back`)."""
     is_autonomous: bool = True
     """Whether robots shift by themselves."""
     speed: float | None = None
@@ -59,8 +62,9 @@ class LiveConfig:
 
     @property
     def graph(self) -> GaitGraph:
-        """The two gaits and their condition as a graph."""
-        return GaitGraph.of(self.condition, flat=self.start, rough=self.rough_gait)
+        """What robots shift by."""
+        shipped = between(load_graph(self.condition), flat=self.start, rough=self.rough_gait)
+        return tuned(shipped, **self.numbers)
 
 
 class LiveRun:
@@ -96,7 +100,7 @@ class LiveRun:
         )
         self.config, self._recorder = config, None
         self.finish_x = ground.extent[1] - RUN_OUT
-        self._touch_w = np.full((config.robots, 4, 3), np.nan)
+        self._frame: Frame | None = None
         self._pushed_until, self._push_w = 0.0, np.zeros(3)
         self._fell_at: float | None = None
         self.ground = ground
@@ -120,7 +124,7 @@ class LiveRun:
 
     def take(self, gait: str) -> None:
         """All robots take up a gait at once."""
-        self._walk.driver.switch(np.arange(self.config.robots), gait, self._walk.world.motion)
+        self._walk.controller.switch(np.arange(self.config.robots), gait, self._walk.world.sensed)
 
     def push(self, force: float, direction: float) -> None:
         """Pushes all bases for `PUSH_TIME`.
@@ -140,19 +144,20 @@ class LiveRun:
         walk.step(self._see, force)
         if walk.fallen[0] and self._fell_at is None:
             self._fell_at = walk.time
-        return self._frame()
+        assert self._frame is not None
+        return self._frame
 
     @property
     def is_over(self) -> bool:
         """Whether the first robot has come to the end, or has lain long enough."""
         if self._fell_at is not None:
             return self._walk.time > self._fell_at + LYING
-        return bool(self._walk.world.motion.base_position_w[0, 0] > self.finish_x)
+        return bool(self._walk.world.truth.base_position_w[0, 0] > self.finish_x)
 
     @property
     def robot(self) -> Robot:
         """Which robot walks."""
-        return self._walk.driver.robot
+        return self._walk.controller.robot
 
     @property
     def machines(self) -> dict[str, RewardMachine]:
@@ -162,7 +167,7 @@ class LiveRun:
     @property
     def gaits(self) -> tuple[str, ...]:
         """Names of the gaits, by the index that frames use."""
-        return self._walk.driver.gaits
+        return self._walk.controller.repertoire.gaits
 
     @property
     def is_recording(self) -> bool:
@@ -179,36 +184,21 @@ class LiveRun:
         return recorder.log() if recorder is not None and recorder.steps >= 2 else None
 
     def _see(self) -> None:
-        motion = self._walk.world.motion
-        self._touch_w = last_touches(self._touch_w, motion.contact, motion.foot_position_w)
+        self._frame = Frame.after(self._frame, step_of(self._walk))
         if self._recorder is not None:
             self._recorder.add()
 
-    def _frame(self) -> Frame:
-        walk, n = self._walk, self.config.robots
-        motion, decision, driver = walk.world.motion, walk.decision, walk.driver
-        shown = decision if walk.switcher is not None else None
-        nothing = np.zeros(n)
-        return Frame(
-            time=walk.time,
-            qpos=walk.world.state()[0],
-            contact=motion.contact,
-            touch_w=self._touch_w,
-            foot_position_w=motion.foot_position_w,
-            foot_height=np.zeros((n, 4)) if shown is None else shown.foot_height,
-            k=nothing if shown is None else shown.k,
-            threshold=nothing if shown is None else shown.threshold,
-            gait=driver.gait.copy(),
-            machine_state=driver.machine_state.copy(),
-            speed=motion.base_linear_velocity_b[:, 0],
-            fallen=walk.fallen.copy(),
-        )
-
     def _switcher(self, config: LiveConfig) -> Autonomous | None:
-        missing = {*config.graph.gaits} - {*self._policies}
+        graph = config.graph
+        missing = {*graph.gaits} - {*self._policies}
         if missing:
             raise GaitshiftError(f"gait must be one with a policy, got '{min(missing)}'")
-        return Autonomous(config.graph, config.robots) if config.is_autonomous else None
+        if any(isinstance(one, Oracle) for one in graph.statistics.values()):
+            raise GaitshiftError(
+                f"condition must be one that robots can sense, got '{config.condition}', which "
+                "needs the truth about the ground"
+            )
+        return Autonomous(graph, config.robots) if config.is_autonomous else None
 
     @staticmethod
     def _rollout(config: LiveConfig) -> RolloutConfig:

@@ -10,13 +10,11 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.show.geometry import Frame
-from gaitshift.show.viewer.charts import Charts
+from gaitshift.show.viewer.charts import Charts, Tape
 from gaitshift.show.viewer.live import LiveConfig, LiveRun
-from gaitshift.show.viewer.orders import Orders
 from gaitshift.show.viewer.panels import build_condition, build_gaits, build_ground, build_push
 from gaitshift.show.viewer.scene import Scene
-from gaitshift.show.viewer.server import TICK, Clock
-from gaitshift.show.viewer.tape import Tape
+from gaitshift.show.viewer.server import TICK, Clock, Orders
 
 _CHARTS_EVERY = 6
 """Pictures between two of the charts."""
@@ -164,17 +162,18 @@ class LivePage:
             cast(Any, client).add_notification(title, body, color=colour)
 
     def _tell(self, frame: Frame) -> None:
-        gait = self._live.gaits[int(frame.gait[0])].replace("_", "-")
-        x = float(frame.qpos[0, 0])
+        step, speed = frame.step, float(frame.step.truth.forward_speed[0])
+        gait = self._live.gaits[int(step.gait[0])].replace("_", "-")
+        x = float(step.truth.base_position_w[0, 0])
         clock = f"{frame.time:.2f} s" if self._paused else f"{frame.time:.1f} s"
-        state = "fallen" if frame.fallen[0] else f"{frame.speed[0]:.2f} m/s"
+        state = "fallen" if step.fallen[0] else f"{speed:.2f} m/s"
         count = "–"
-        if frame.threshold[0]:
-            config = self._live.config
-            shifted = self._live.gaits[int(frame.gait[0])] != config.start
-            soonest = config.condition.soonest(shifted=shifted)
-            way = soonest * max(float(frame.speed[0]), 0.0)
+        if step.threshold[0]:
+            graph, gait_now = self._live.config.graph, self._live.gaits[int(step.gait[0])]
+            edge = next(edge for edge in graph.edges if edge.source == gait_now)
+            soonest = edge.rule.soonest(graph.statistics[edge.statistic].width)
+            way = soonest * max(speed, 0.0)
             count = (
-                f"k {frame.k[0]:.0f} of {frame.threshold[0]:.0f} (β: {soonest:.2f} s, {way:.2f} m)"
+                f"k {step.k[0]:.0f} of {step.threshold[0]:.0f} (β: {soonest:.2f} s, {way:.2f} m)"
             )
         self._status.content = f"**{gait}** · {state} · {x:.1f} m · {clock} · {count}"

@@ -5,9 +5,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from gaitshift.shift import CONDITIONS
+from gaitshift.shift import load_graph, numbers_of
 from gaitshift.show.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, LiveRun
-from gaitshift.show.viewer.orders import Orders
+from gaitshift.show.viewer.server import Orders
+
+_CONDITIONS = ("terrain", "height_difference", "paper")
+"""Shipped graphs of two gaits that the page offers."""
 
 _GAITS_A_ROW = 4
 """Buttons for gaits beside each other."""
@@ -47,9 +50,10 @@ def build_gaits(gui: Any, orders: Orders, live: LiveRun) -> None:
 
 def build_condition(gui: Any, orders: Orders, live: LiveRun) -> None:
     """Which condition, and its numbers."""
-    condition, names = live.config.condition, tuple(CONDITIONS)
-    now = next((name for name in names if CONDITIONS[name] == condition), names[0])
-    name = gui.add_dropdown("condition", names, initial_value=now)
+    shown = live.config.condition
+    offered = tuple(dict.fromkeys((*_CONDITIONS, shown)))  # it may be a file
+    name = gui.add_dropdown("condition", offered, initial_value=shown)
+    now = numbers_of(live.config.graph)
     ranges = {
         "alpha": ("α [m]", 0.001, 0.3, 0.0002),
         "beta": ("β [counts]", 0, 1500, 1),
@@ -58,20 +62,19 @@ def build_condition(gui: Any, orders: Orders, live: LiveRun) -> None:
         "beta_back": ("β' [counts]", 0, 1500, 1),
     }
     numbers = {
-        key: gui.add_slider(
-            label, min=low, max=high, step=step, initial_value=getattr(condition, key)
-        )
+        key: gui.add_slider(label, min=low, max=high, step=step, initial_value=now[key])
         for key, (label, low, high, step) in ranges.items()
     }
 
     def tune() -> None:
         values = {key: float(handle.value) for key, handle in numbers.items()}
-        _change(live, condition=replace(CONDITIONS[name.value], **values))
+        _change(live, condition=name.value, numbers=values)
 
     def choose() -> None:
+        shipped = numbers_of(load_graph(name.value))
         for key, handle in numbers.items():
-            handle.value = getattr(CONDITIONS[name.value], key)
-        _change(live, condition=CONDITIONS[name.value])
+            handle.value = shipped[key]
+        _change(live, condition=name.value, numbers={})
 
     orders.on_update(name, choose)
     for handle in numbers.values():

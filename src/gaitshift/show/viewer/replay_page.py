@@ -6,18 +6,16 @@ from typing import Any, cast
 
 import viser
 
-from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ROBOTS
+from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.show.geometry import frames_of
 from gaitshift.show.plots.signals import check_robot, ground_of
-from gaitshift.show.viewer.charts import Charts
+from gaitshift.show.viewer.charts import WINDOW, Charts, Tape
 from gaitshift.show.viewer.live import MOST_ROBOTS
 from gaitshift.show.viewer.scene import Scene
 from gaitshift.show.viewer.server import TICK, Clock
-from gaitshift.show.viewer.tape import WINDOW, Tape
 
 _EVERY = round(TICK / CONTROL_PERIOD)
 """Entries of a log from picture to picture."""
@@ -26,16 +24,14 @@ _EVERY = round(TICK / CONTROL_PERIOD)
 class ReplayPage:
     """Puts a log on a page."""
 
-    def __init__(self, server: viser.ViserServer, log: Log) -> None:
-        if log.robot not in ROBOTS:
-            raise GaitshiftError(
-                f"robot of the log must be one of {', '.join(ROBOTS)}, got '{log.robot}'"
-            )
+    def __init__(self, server: viser.ViserServer, log: Log, robot: Robot = ANYMAL_B) -> None:
+        """`robot` is what the log is of; `GaitshiftError` where it is of another one."""
+        robot.check_is(log.robot, "the log")
         check_robot(log, 0)
         self._frames = frames_of(_few(log), _EVERY)
-        self._scene = Scene(server, ROBOTS[log.robot], log.gaits)
+        self._scene = Scene(server, robot, log.gaits)
         self._scene.set_ground(ground_of(log))
-        self._scene.set_robots(len(self._frames[0].qpos))
+        self._scene.set_robots(self._frames[0].step.n)
         self._tape, self._at, self._plays = Tape(), 0, True
         self._factor, self._owed = 1.0, 0.0
         self._orders: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -80,7 +76,7 @@ class ReplayPage:
         panel.dock_left()
         panel.set_width(340)
         end = self._frames[-1].time
-        n = len(self._frames[0].qpos)
+        n = self._frames[0].step.n
         gui.add_markdown(f"{log.terrain} · {n} robot{'s' if n > 1 else ''} · {end:.1f} s")
         play = gui.add_button("pause")
         self._slider = gui.add_slider(
@@ -117,4 +113,4 @@ def _machines(log: Log) -> Mapping[str, RewardMachine | None]:
 
 def _few(log: Log) -> Log:
     """The first robots of a log, as many as a page shows."""
-    return log if log.k.shape[1] <= MOST_ROBOTS else log.robots(slice(0, MOST_ROBOTS))
+    return log if log.n <= MOST_ROBOTS else log.robots(slice(0, MOST_ROBOTS))

@@ -10,7 +10,7 @@ from PIL import ImageColor
 
 from gaitshift.robot.description import Robot
 from gaitshift.show.geometry import Frame, Shape, ground_mesh, linear, plane_corners
-from gaitshift.show.plots.palette import gait_colours
+from gaitshift.show.plots.style import gait_colours
 from gaitshift.sim.terrain import Terrain
 
 _DARK = (70, 75, 82)
@@ -81,18 +81,18 @@ class Scene:
     def draw(self, frame: Frame) -> None:
         """Shows a frame."""
         if self.follows:
-            base = frame.qpos[0, :3] * np.array([1.0, 1.0, 0.0])
+            base = frame.step.truth.base_position_w[0] * np.array([1.0, 1.0, 0.0])
             far = np.linalg.norm(base - self._centre) > 3.0
             self._centre = base if far else self._centre + _FOLLOW * (base - self._centre)
             self._root.position = -self._centre
-        position, rotation = self._shape.poses(frame.qpos)
+        position, rotation = self._shape.poses(frame.step.qpos)
         for handle, where, turned in zip(self._bodies, position, rotation, strict=True):
             handle.batched_positions = (where - self._centre).astype(np.float32)
             handle.batched_wxyzs = turned.astype(np.float32)
-        feet = frame.foot_position_w + np.array([0.0, 0.0, self._radius]) - self._centre
+        feet = frame.step.truth.foot_position_w + np.array([0.0, 0.0, self._radius]) - self._centre
         self._feet.batched_positions = feet.reshape(-1, 3).astype(np.float32)
-        lit = self._palette[frame.gait][:, None, :]
-        colours = np.where(frame.contact[..., None], lit, _DARK).reshape(-1, 3)
+        lit = self._palette[frame.step.gait][:, None, :]
+        colours = np.where(frame.step.sensed.contact[..., None], lit, _DARK).reshape(-1, 3)
         self._feet.batched_colors = linear(colours)
         self._draw_plane(frame.touch_w[0] - self._centre)
 

@@ -1,4 +1,4 @@
-"""What robots in training are asked to do: speeds, stride frequencies, headings to turn to."""
+"""Commands in training: random speeds, stride frequencies and headings."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,7 +12,7 @@ from gaitshift.sim.env.config import EnvConfig
 
 
 class Commander:
-    """The commands of N robots, drawn anew from time to time."""
+    """The commands of N robots, redrawn at intervals."""
 
     def __init__(
         self, machine: RewardMachine, config: EnvConfig, n: int, rng: np.random.Generator
@@ -22,14 +22,14 @@ class Commander:
         self.heading: Float[np.ndarray, " N"] = np.zeros(n)
         """Wanted heading of each robot [rad]."""
         self.command = self._own(n)
-        """What is asked for now."""
+        """The present command."""
 
     def restart(
         self, ids: Int[np.ndarray, " K"], yaw: Float[np.ndarray, " K"], scale: float
     ) -> None:
-        """Episodes of these robots begin, on lines along `yaw` [rad].
+        """Draws commands for new episodes of these robots, on lines along `yaw` [rad].
 
-        `scale` is the share of the gait's ranges that commands are drawn from, here and in
+        `scale` is the share of the gait's ranges from which commands are drawn, here and in
         `update`.
         """
         self._line[ids] = self.heading[ids] = yaw
@@ -38,7 +38,7 @@ class Commander:
     def update(
         self, age: Int[np.ndarray, " N"], yaw: Float[np.ndarray, " N"], scale: float
     ) -> None:
-        """Draws what is due, and turns every robot towards its heading.
+        """Draws the commands that are due, and commands every robot to turn to its heading.
 
         Args:
             age: steps since each episode began.
@@ -57,7 +57,7 @@ class Commander:
             self.command = replace(self.command, yaw_rate=yaw_rate)
 
     def ranges(self) -> dict[str, Any]:
-        """Own value and range of forward speed and stride frequency."""
+        """Nominal value and range of forward speed and stride frequency."""
         own, machine = self._own(1), self._machine
         speed, frequency = float(own.forward_speed[0]), float(own.stride_frequency[0])
         slow, fast = (1.0 / (machine.stride(d) * CONTROL_PERIOD) for d in machine.dwell_range[::-1])
@@ -70,13 +70,13 @@ class Commander:
         }
 
     def _own(self, n: int) -> Command:
-        """Straight ahead, at the gait's own speed and frequency but for what the config says."""
+        """Straight ahead at the config's speed, or the gait's, and the gait's frequency."""
         machine, speed = self._machine, self._config.forward_speed
         frequency = 1.0 / (machine.stride() * CONTROL_PERIOD)
         return Command.straight(n, machine.speed if speed is None else speed, frequency)
 
     def _draw(self, ids: Int[np.ndarray, " K"], scale: float) -> None:
-        """Gives these robots a speed and a stride frequency, each drawn or the gait's own."""
+        """Gives these robots a speed and a stride frequency, each drawn or nominal."""
         share = self._config.command_share
         if share == 0 or scale == 0:
             return

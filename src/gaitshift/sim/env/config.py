@@ -1,4 +1,4 @@
-"""What an environment is made of, as data."""
+"""The configuration of an environment."""
 
 from dataclasses import dataclass, field
 
@@ -22,12 +22,12 @@ class EnvConfig:
     gains: str = "default"
     """Preset of the robot's joint gains."""
     episode_steps: int = 1000
-    """Control steps until an episode is cut (10 s); ours, the paper gives none."""
+    """Control steps until an episode is truncated (10 s); ours, the paper gives none."""
     forward_speed: float | None = None
-    """Commanded speed along body x where none is drawn [m/s]; None: the gait's own."""
+    """Commanded speed along body x where none is drawn [m/s]; None: the gait's nominal speed."""
     command_share: float = 0.6
     """Share of the draws of a command that are uniform in the gait's ranges of speed and stride
-    frequency, each by itself; the others are the gait's own. 0: always its own. Ours."""
+    frequency, independently; the others are the gait's nominal values. 0: always nominal. Ours."""
     heading_range: float = 0.8
     """Wanted headings are drawn within ± this of the present line [rad]; 0 leaves the yaw-rate
     command at zero, as in the paper. Ours."""
@@ -40,7 +40,7 @@ class EnvConfig:
     velocity_noise: float = 0.3
     """The base starts with a velocity within ± this along x and y [m/s]; ours."""
     terrain_margin: float = 0.8
-    """A robot nearer than this to the border of its terrain starts anew elsewhere [m]; ours."""
+    """A robot nearer than this to the border of its terrain restarts elsewhere [m]; ours."""
 
     def __post_init__(self) -> None:
         if self.episode_steps < 1:

@@ -1,4 +1,4 @@
-"""The environment: one control step, told as the paper tells it."""
+"""The environment: a control step in the order of the paper."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,13 +10,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
-from gaitshift.control.observation import Observation, Situation, last_touch
+from gaitshift.control.observation import GaitState, Observation
+from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import ACTION_LIMIT
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.motion import Motion
+from gaitshift.robot.state import Privileged
 from gaitshift.sim.env.commander import Commander
 from gaitshift.sim.env.config import EnvConfig
+from gaitshift.sim.env.curriculum import Curriculum
 from gaitshift.sim.env.mixed_start import MixedStart, mix
 from gaitshift.sim.env.swings import Swings
 from gaitshift.sim.reward import earned_bonus, walk_reward, with_bonus
@@ -29,12 +31,12 @@ Observations = Float32[np.ndarray, "N D"]
 class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
 
-    An episode ends when the body touches the ground or the machine accepts, and is cut after
+    An episode ends when the body touches the ground or the machine accepts, and is truncated after
     `episode_steps` or at the border of the terrain. Robots restart in the same step
     (`AutoresetMode.SAME_STEP`); the observation that ended an episode is in `info["final_obs"]`,
-    where `info["_final_obs"]` holds.
-    `info["reward_terms"]` has each weighted term of R_walk, `info["bonus"]` what the machine added,
-    `info["changed"]` says where it changed its state.
+    where `info["_final_obs"]` is true. `info["reward_terms"]` has each weighted term of R_walk,
+    `info["bonus"]` the machine's bonus, and `info["changed"]` whether the machine changed its
+    state.
     """
 
     def __init__(
@@ -51,23 +53,18 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.machine = machine
         self.robot = robot
         self.num_envs = num_envs
-        self.observe = Observation(machine, self.config.observed)
+        self.walker = Walker(
+            machine=machine,
+            observation=Observation(machine, robot.stance, self.config.observed),
+            action_scale=robot.action_scale,
+        )
+        """Observation, meaning of actions, and steps of the machine."""
         self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
-        self.strictness = 1.0
-        """How much of what only a clean gait can give is asked for now, 0 to 1: how far the bonus
-        depends on swing heights and punctuality, and factor on the price of chatter."""
-        self.swing_factor = 1.0
-        """Factor on the machine's swing heights now."""
-        self.command_scale = 1.0
-        """The share of the gait's ranges that commands are drawn from now, 0 to 1."""
-        self.penalty_scale = 1.0
-        """The factor λ on all penalties now, 0 to 1 (paper III-D, where it is always 1)."""
-        self.mixed_starts = 0.0
-        """The share of episodes that begin in the midst of a stride that is no gait's (`mix`), of
-        those that begin while others go on."""
+        self.curriculum = Curriculum()
+        """The present difficulty; may be replaced between two steps."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
         self.single_observation_space = gym.spaces.Box(
-            -np.inf, np.inf, (self.observe.size,), np.float32
+            -np.inf, np.inf, (self.walker.observation.size,), np.float32
         )
         self.single_action_space = gym.spaces.Box(-ACTION_LIMIT, ACTION_LIMIT, (12,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -78,7 +75,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, dict[str, Any]]:
-        """Starts every episode anew. The same seed gives the same bits ever after."""
+        """Restarts every episode. All later steps are the same, to the bit, for the same seed."""
         if seed is not None:
             self._start(np.random.default_rng(seed))
         self._restart(np.arange(self.num_envs))
@@ -94,55 +91,56 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         dict[str, Any],
     ]:
         """One control step of 10 ms; `actions` scale to joint targets about the stance."""
-        action = np.clip(np.asarray(actions, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
+        action, target = self.walker.target(actions)
         self.world.push(self._pusher.step())
-        motion = self.world.step(self._stance + self.robot.action_scale * action)
-        dwell = self.machine.dwell_for(self._commander.command.stride)
-        step = self.machine.step(self._state, motion.contact, self._steps_in_state, dwell=dwell)
-        on_time = self.machine.punctuality(self._state, self._steps_in_state, dwell)
-        chatter, swing_share = self._swings.see(self._state, step, motion, self.swing_factor)
-        self._touch_height = last_touch(motion, self._touch_height)
-        self._state = step.state
-        self._steps_in_state = np.where(step.changed, 0, self._steps_in_state + 1)
-        agreement = self.machine.agreement(self._state, motion.contact)
+        sensed, truth = self.world.step(target)
+        command, before = self._commander.command, self._state
+        self._state, step = self.walker.step(before, action, sensed, command)
+        left, waited = before.machine_state, before.steps_in_state
+        on_time = self.machine.punctuality(left, waited, self.machine.dwell_for(command.stride))
+        asked = self.curriculum
+        chatter, swing_share = self._swings.see(
+            left, step, sensed.contact, truth.clearance, asked.swing_factor
+        )
+        agreement = self.machine.agreement(step.state, sensed.contact)
         terms = walk_reward(
             self.config.reward,
-            motion,
-            self._commander.command,
+            sensed,
+            truth,
+            command,
             stance=self._stance,
             agreement=agreement,
-            chatter=self.strictness * chatter,
-            action_change=action - self._last_action,
-            penalty_scale=self.penalty_scale,
+            chatter=asked.strictness * chatter,
+            action_change=action - before.last_action,
+            penalty_scale=asked.penalty_scale,
         )
         bonus = earned_bonus(
             self.config.reward,
             step.bonus,
             swing_share=swing_share,
             on_time=on_time,
-            strictness=self.strictness,
+            strictness=asked.strictness,
         )
         walk = np.sum(list(terms.values()), axis=0)
         reward = with_bonus(self.config.reward, walk, bonus)
-        self._last_action = action
         self._age += 1
         info = {
             "reward_terms": terms,
             "bonus": reward - walk,
             "changed": step.changed,
             "shows_stance": agreement == 1.0,
-            "forward_speed": motion.base_linear_velocity_b[:, 0],
+            "forward_speed": truth.forward_speed,
         }
-        terminated = motion.body_contact | np.isin(self._state, self.machine.accepting)
-        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(motion)
+        terminated = truth.body_contact | np.isin(step.state, self.machine.accepting)
+        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(truth)
         truncated &= ~terminated
         observation = self._next_observation(terminated | truncated, info)
         return observation, reward, terminated, truncated, info
 
     def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
-        """Exchanges the ground under the robots, which go on as they moved.
+        """Replaces the ground under the robots, which keep their motion.
 
-        Several grounds are shared out as in `World`; they cover the same rectangle.
+        Robots are divided among several grounds as in `World`; all cover the same rectangle.
         """
         self.world.set_terrain(terrain)
 
@@ -152,19 +150,16 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._pusher = Pusher(self.config.push, self.num_envs, self._rng)
 
     def spread_ages(self) -> None:
-        """Draws the present age of every episode, so that not all are cut in the same step."""
+        """Draws the age of every episode, so that they are truncated at different times."""
         self._age = self._rng.integers(0, self.config.episode_steps, self.num_envs)
 
     def _start(self, rng: np.random.Generator) -> None:
         n = self.num_envs
         self._rng = rng
         self._pusher = Pusher(self.config.push, n, rng)
-        self._state: Int[np.ndarray, " N"] = np.full(n, self.machine.initial)
-        self._steps_in_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
+        self._state = self.walker.begin(self.world.sensed)
         self._swings = Swings(self.machine, n)
-        self._touch_height: Float[np.ndarray, "N 4"] = np.zeros((n, 4))
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        self._last_action: Float[np.ndarray, "N 12"] = np.zeros((n, 12))
         self._commander = Commander(self.machine, self.config, n, rng)
 
     def _next_observation(self, done: Bool[np.ndarray, " N"], info: dict[str, Any]) -> Observations:
@@ -192,31 +187,30 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             base_velocity_w=velocity,
         )
         self._pusher.clear(ids)
-        self._state[ids] = self.machine.initial
-        self._steps_in_state[ids] = 0
+        begun = self.walker.begin(self.world.sensed.robots(ids))
+        self._state = self._state.with_robots(ids, begun)
         self._swings.restart(ids)
-        self._touch_height[ids] = last_touch(self.world.motion)[ids]
         self._age[ids] = 0
-        self._last_action[ids] = 0.0
         if start is not None:
             self._set_going(moving, start, yaw[np.isin(ids, moving)])
-        self._commander.restart(ids, yaw, self.command_scale)
+        self._commander.restart(ids, yaw, self.curriculum.command_scale)
         self._update_command()
 
     def _draw_mixed(
         self, ids: Int[np.ndarray, " K"]
     ) -> tuple[Int[np.ndarray, " M"], MixedStart | None]:
-        """Which of the robots that start anew do so on their way, and how."""
+        """Which of the restarting robots start in mid-stride, and their states."""
         moving = ids[:0]
-        if self.mixed_starts > 0 and len(ids) < self.num_envs:
-            moving = ids[self._rng.random(len(ids)) < self.mixed_starts]
+        share = self.curriculum.mixed_starts
+        if share > 0 and len(ids) < self.num_envs:
+            moving = ids[self._rng.random(len(ids)) < share]
         if moving.size == 0:
             return moving, None
         others = np.setdiff1d(np.arange(self.num_envs), ids)
         return moving, mix(
-            self.world.motion,
-            self._last_action,
-            self._touch_height,
+            self.world.sensed,
+            self.world.truth,
+            self._state,
             among=others,
             count=len(moving),
             rng=self._rng,
@@ -225,12 +219,12 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def _set_going(
         self, ids: Int[np.ndarray, " M"], start: MixedStart, yaw: Float[np.ndarray, " M"]
     ) -> None:
-        """Robots that stand at their starting points go on as if they had been on their way."""
+        """Puts robots at their starting points into these states in mid-stride."""
         turn = yaw - start.yaw
         c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
         self.world.place(
             ids,
-            xy=self.world.motion.base_position_w[ids, :2],
+            xy=self.world.truth.base_position_w[ids, :2],
             yaw=turn,
             attitude=start.attitude,
             joint_position=start.joint_position,
@@ -238,9 +232,13 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             base_velocity_w=np.stack((c * x - s * y, s * x + c * y, z), axis=-1),
             base_angular_velocity_b=start.base_angular_velocity_b,
         )
-        self._state[ids] = self.machine.enter(start.contact)
-        self._last_action[ids] = start.last_action
-        self._touch_height[ids] = start.touch_height
+        going = GaitState(
+            machine_state=self.machine.enter(start.contact),
+            steps_in_state=np.zeros(len(ids), dtype=np.int64),
+            last_action=start.last_action,
+            touch_height=start.touch_height,
+        )
+        self._state = self._state.with_robots(ids, going)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:
@@ -251,33 +249,24 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         high = (max(x1 - inset, (x0 + x1) / 2), max(y1 - inset, (y0 + y1) / 2))
         return self._rng.uniform(low, high, (count, 2))
 
-    def _left_terrain(self, motion: Motion) -> Bool[np.ndarray, " N"]:
+    def _left_terrain(self, truth: Privileged) -> Bool[np.ndarray, " N"]:
         if self._is_level:
             return np.zeros(self.num_envs, dtype=bool)
         inside = self.world.terrains[0].contains
-        return ~inside(motion.base_position_w[:, :2], self.config.terrain_margin)
+        return ~inside(truth.base_position_w[:, :2], self.config.terrain_margin)
 
     @property
     def _is_level(self) -> bool:
-        """Whether no robot's ground has a border: level ground goes on for ever."""
+        """Whether the ground of all robots is level, and so has no border."""
         return all(terrain.is_flat for terrain in self.world.terrains)
 
     def _update_command(self) -> None:
-        self._commander.update(self._age, self.world.motion.yaw, self.command_scale)
+        scale = self.curriculum.command_scale
+        self._commander.update(self._age, self.world.sensed.yaw, scale)
 
     def commands(self) -> dict[str, Any]:
-        """What may be commanded: own value and range of forward speed and stride frequency."""
+        """Nominal value and range of the forward-speed and stride-frequency commands."""
         return self._commander.ranges()
 
     def _observation(self) -> Observations:
-        return self.observe(
-            Situation(
-                machine_state=self._state,
-                steps_in_state=self._steps_in_state,
-                motion=self.world.motion,
-                command=self._commander.command,
-                last_action=self._last_action,
-                stance=self._stance,
-                touch_height=self._touch_height,
-            )
-        )
+        return self.walker.observe(self._state, self.world.sensed, self._commander.command)

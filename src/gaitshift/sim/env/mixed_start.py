@@ -1,16 +1,17 @@
-"""An episode that begins in the midst of a stride that is no gait's: legs of several robots."""
+"""Episodes that start mid-stride with legs out of phase: each leg is copied from another robot."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from gaitshift.robot.motion import Motion
+from gaitshift.control.observation import GaitState
+from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MixedStart:
-    """K robots on their way."""
+    """State of K robots in mid-stride."""
 
     joint_position: Float[np.ndarray, "K 12"]
     """[rad]"""
@@ -25,34 +26,34 @@ class MixedStart:
     yaw: Float[np.ndarray, " K"]
     """The heading [rad]."""
     last_action: Float[np.ndarray, "K 12"]
-    """Of the robots that the legs are taken from."""
+    """Of the robots from which the legs are copied."""
     touch_height: Float[np.ndarray, "K 4"]
-    """At which those feet last touched, from the base [m]."""
+    """Height above the base at which those feet last touched [m]."""
     contact: Bool[np.ndarray, "K 4"]
     """Which of those feet are down."""
 
 
 def mix(
-    motion: Motion,
-    last_action: Float[np.ndarray, "N 12"],
-    touch_height: Float[np.ndarray, "N 4"],
+    sensed: Proprioception,
+    truth: Privileged,
+    state: GaitState,
     *,
     among: Int[np.ndarray, " M"],
     count: int,
     rng: np.random.Generator,
 ) -> MixedStart:
-    """Puts robots together: the base of one that is on its way, and each leg of another.
+    """Combines the base of one walking robot with each leg of another.
 
-    Any gait is one relation between the phases of four legs, so such starts hold what a robot finds
-    whose gait was changed in the midst of a stride, whatever the gait before.
+    A gait is a relation between the phases of the four legs. Legs with random phases therefore
+    cover the states after a shift in mid-stride from any other gait.
 
     Args:
-        motion: of all robots at this instant.
-        last_action: of all robots.
-        touch_height: of all robots [m].
-        among: robots that may be taken from.
-        count: how many to put together.
-        rng: draws whom.
+        sensed: proprioception of all robots at this instant.
+        truth: privileged state at the same instant.
+        state: gait state of all robots.
+        among: robots that may be copied from.
+        count: number of states to make.
+        rng: draws the robots.
     """
     base, leg = rng.choice(among, count), rng.choice(among, (count, 4))
     of_leg = (leg, np.arange(4))
@@ -60,14 +61,15 @@ def mix(
     def legs_of(joints: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "K 12"]:
         return joints.reshape(-1, 4, 3)[of_leg].reshape(count, 12)
 
+    attitude = truth.base_quaternion_w[base]
     return MixedStart(
-        joint_position=legs_of(motion.joint_position),
-        joint_velocity=legs_of(motion.joint_velocity),
-        attitude=motion.base_quaternion_w[base],
-        base_velocity_w=motion.base_linear_velocity_w[base],
-        base_angular_velocity_b=motion.base_angular_velocity_b[base],
-        yaw=motion.yaw[base],
-        last_action=legs_of(last_action),
-        touch_height=touch_height[of_leg],
-        contact=motion.contact[of_leg],
+        joint_position=legs_of(sensed.need("joint_position", "a mixed start")),
+        joint_velocity=legs_of(sensed.need("joint_velocity", "a mixed start")),
+        attitude=attitude,
+        base_velocity_w=np.einsum("kij,kj->ki", rotation_of(attitude), truth.velocity_b[base]),
+        base_angular_velocity_b=sensed.need("angular_velocity_b", "a mixed start")[base],
+        yaw=sensed.yaw[base],
+        last_action=legs_of(state.last_action),
+        touch_height=state.touch_height[of_leg],
+        contact=sensed.contact[of_leg],
     )

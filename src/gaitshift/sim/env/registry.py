@@ -1,4 +1,4 @@
-"""The ids by which Gymnasium knows the gaits: `gaitshift/trot-v0` and so on."""
+"""The Gymnasium ids of the gaits: `gaitshift/trot-v0` and so on."""
 
 import gymnasium as gym
 

@@ -1,16 +1,15 @@
-"""What becomes of each foot between the moment the machine lifts it and its touchdown."""
+"""The swing of each foot, from the change of state that lifts it to its touchdown."""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from gaitshift.gait import RewardMachine, Step
-from gaitshift.robot.motion import Motion
 
 
 class Swings:
-    """The swings of N robots' feet: how high they went, and touchdowns out of place.
+    """The swings of N robots' feet: their heights, and touchdowns out of place.
 
-    At the start of an episode every foot may land once, and is taken for high enough.
+    At the start of an episode every foot may land once, and its swing counts as high enough.
     """
 
     def __init__(self, machine: RewardMachine, n: int) -> None:
@@ -27,27 +26,33 @@ class Swings:
         self._may_land[ids] = True
 
     def see(
-        self, left: Int[np.ndarray, " N"], step: Step, motion: Motion, factor: float = 1.0
+        self,
+        left: Int[np.ndarray, " N"],
+        step: Step,
+        contact: Bool[np.ndarray, "N 4"],
+        clearance: Float[np.ndarray, "N 4"],
+        factor: float = 1.0,
     ) -> tuple[Int[np.ndarray, " N"], Float[np.ndarray, " N"]]:
         """Number of touchdowns out of place, and share of the swing height that was reached.
 
-        In place is one touchdown after the machine has lifted the foot, in a state that has it in
-        its stance or in the state before. The share is that of the edge taken, 1 where there is
-        none.
+        A touchdown is in place if it is the first since the machine lifted the foot, and if the
+        state or the next one has the foot in its stance. The share is that of the edge taken, 1
+        without an edge.
 
         Args:
-            left: state in which the machine was.
-            step: what its step did.
-            motion: the motion after the step.
+            left: state of the machine before the step.
+            step: result of the machine's step.
+            contact: which feet are down after the step.
+            clearance: of the feet over the ground [m].
             factor: on the machine's swing heights.
         """
-        lands = motion.contact & ~self._touches
+        lands = contact & ~self._touches
         in_place = lands & self._may_land & self._machine.expected(left)
-        height = np.fmax(self._height, motion.clearance)
+        height = np.fmax(self._height, clearance)
         lifted = self._machine.lifted(left, step.state)
-        self._touches = motion.contact.copy()
+        self._touches = contact.copy()
         self._may_land = (self._may_land & ~in_place) | lifted
-        self._height = np.where(lifted, motion.clearance, height)
+        self._height = np.where(lifted, clearance, height)
         return (lands & ~in_place).sum(axis=1), self._machine.swing_share(
             step.edge, height / factor
         )

@@ -1,12 +1,12 @@
 """The ground in metres: height fields, makers of terrains and tracks, and their specs as text."""
 
-from gaitshift.sim.terrain.height_field import Section, Terrain
+from gaitshift.sim.terrain.height_field import Section, Terrain, UnitField, to_unit_interval
+from gaitshift.sim.terrain.kind import Kind
 from gaitshift.sim.terrain.pebbles import pebbles
 from gaitshift.sim.terrain.perlin import perlin
 from gaitshift.sim.terrain.shapes import bank, flat, slope, stairs, step
-from gaitshift.sim.terrain.spec import KINDS, Kind, from_spec, spec_help
+from gaitshift.sim.terrain.spec import KINDS, from_spec, spec_help
 from gaitshift.sim.terrain.track import sections_of, track
-from gaitshift.sim.terrain.unit_interval import UnitField, to_unit_interval
 
 __all__ = [
     "KINDS",

@@ -1,4 +1,4 @@
-"""The sample points of a field that is still to be made."""
+"""The sample points of a field."""
 
 from dataclasses import dataclass
 from math import ceil
@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.quantity import Quantity
+from gaitshift.sim.terrain.kind import Quantity
 
 CELL = 0.10
 """Default for smooth ground [m]. Ours: 3.75 samples on the shortest lattice of Perlin's noise."""

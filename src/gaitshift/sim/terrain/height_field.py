@@ -3,9 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Float32
 
 from gaitshift.errors import GaitshiftError
+
+_FLAT_ELEVATION = 0.01
+"""Scale of a field whose samples are all 0 [m]: without effect, but MuJoCo needs it positive."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +41,7 @@ class Terrain:
     origin: tuple[float, float]
     """World x and y of sample [0, 0], the corner of smallest x and y [m]."""
     name: str
-    """The spec it was made of, for logs; arguments away from their defaults are not told."""
+    """The spec it was made from, for logs; it lacks arguments that differ from their defaults."""
     sections: tuple[Section, ...] = ()
     """The pieces along x, in order and without gaps; left empty: one, the whole field."""
 
@@ -84,8 +87,8 @@ class Terrain:
     def height_at(self, xy: Float[np.ndarray, "*batch 2"]) -> Float[np.ndarray, "*batch"]:
         """Height below points `xy` [m], world frame, of the surface that MuJoCo collides with.
 
-        Outside the field the height of the nearest point of the border is given, where MuJoCo has
-        no ground. A point that is not a number has no height: NaN.
+        Outside the field, where MuJoCo has no ground, it is the height of the nearest point of the
+        border. The height of a NaN point is NaN.
         """
         near, middle, far, u, v = self._triangle(xy)
         # From the corner along the grid as far as the larger of u, v, then along the other axis.
@@ -128,3 +131,38 @@ class Terrain:
         middle = corner + np.where(u < v, cols, 1)
         near, far = samples.take(corner), samples.take(corner + cols + 1)
         return np.asarray(near), np.asarray(samples.take(middle)), np.asarray(far), u, v
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UnitField:
+    """The numbers of MuJoCo's `<hfield>` and of its geom."""
+
+    data: Float32[np.ndarray, "rows cols"]
+    """Samples from 0 (lowest) to 1 (highest), as `hfield_data` holds them; all 0 when flat.
+
+    They span [0, 1] whole, so that the compiler's own normalisation leaves them as they are.
+    """
+    size: tuple[float, float, float, float]
+    """The asset's `size`: half length, half width, height of a sample of 1, base thickness [m]."""
+    position: tuple[float, float, float]
+    """The geom's `pos`, world frame: the middle of the field, at the lowest sample's height [m]."""
+
+
+def to_unit_interval(terrain: Terrain, *, base: float = 0.5) -> UnitField:
+    """Terrain as MuJoCo's height field; `base` [m] is the solid ground below its lowest sample.
+
+    float32 rounds samples to within 3e-8 of the relief (highest minus lowest sample), so that
+    MuJoCo's surface and `Terrain.height_at` agree to 1e-6 m on any relief up to 30 m.
+
+    The default of `base` is ours: much thicker than the few millimetres by which a foot sinks in,
+    so that a contact never pushes a foot downwards.
+    """
+    lowest = float(terrain.height.min())
+    relief = float(terrain.height.max()) - lowest
+    elevation = relief if relief > 0.0 else _FLAT_ELEVATION
+    (x0, y0), (length, width) = terrain.origin, terrain.size
+    return UnitField(
+        data=((terrain.height - lowest) / elevation).astype(np.float32),
+        size=(length / 2, width / 2, elevation, base),
+        position=(x0 + length / 2, y0 + width / 2, lowest),
+    )

@@ -6,9 +6,9 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.grid import FINE_CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.quantity import Quantity, spell
+from gaitshift.sim.terrain.kind import Kind, Quantity, spell
 
-PEBBLE_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
+_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
 """Of the highest pebble."""
 
 _DENSITY = Quantity(name="density", unit="pebbles per m²", low=0.01, high=100.0)
@@ -31,15 +31,15 @@ def pebbles(
 ) -> Terrain:
     """Round bumps on level ground at z = 0, the highest sample exactly `height` [m].
 
-    `density` [1/m²] times the area, rounded, but at least one, is their number; their places are
-    even over the field, their diameters even between the two of `diameter` [m]. A bump of radius R
-    has the profile (1 − r²/R²)²; where two overlap the higher counts. The defaults are ours: flat
-    stones a little wider than a foot, on 7 % of the ground.
+    Their number is `density` [1/m²] times the area, rounded, but at least one. Their places are
+    uniform over the field, their diameters uniform between the two of `diameter` [m]. A bump of
+    radius R has the profile (1 − r²/R²)²; where two overlap the higher counts. The defaults are
+    ours: flat stones a little wider than a foot, on 7 % of the ground.
 
     `GaitshiftError` where a number is out of range, or `cell` is longer than half of the smallest
-    diameter: a bump between the samples would be lost.
+    diameter, because a bump between the samples would be lost.
     """
-    PEBBLE_HEIGHT.check(height)
+    _HEIGHT.check(height)
     _DENSITY.check(density)
     smallest, largest = (_DIAMETER.check(value) for value in diameter)
     if smallest > largest:
@@ -75,3 +75,16 @@ def _strewn(
         bump = share[n] * np.maximum(1.0 - squared / radius[n] ** 2, 0.0) ** 2
         height[rows, cols] = np.maximum(height[rows, cols], bump)
     return height
+
+
+KINDS = (
+    Kind(
+        name="pebbles",
+        number=_HEIGHT,
+        cell=FINE_CELL,
+        meaning="round bumps 0.1 to 0.2 m wide, 4 a square metre, the highest this high",
+        make=lambda number, seed, length, width, cell: pebbles(
+            number, seed=seed, length=length, width=width, cell=cell
+        ),
+    ),
+)

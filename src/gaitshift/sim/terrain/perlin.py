@@ -6,10 +6,9 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.grid import CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.quantity import Quantity, spell
-from gaitshift.sim.terrain.smoothstep import smoothstep
+from gaitshift.sim.terrain.kind import Kind, Quantity, spell
 
-AMPLITUDE = Quantity(name="amplitude", unit="m", low=0.0, high=1.0)
+_AMPLITUDE = Quantity(name="amplitude", unit="m", low=0.0, high=1.0)
 """Of the largest |height|. Ours: twice ANYmal's standing height is no ground to walk on."""
 
 _WAVELENGTH = Quantity(name="wavelength", unit="m", low=0.1, high=100.0)
@@ -36,13 +35,13 @@ def perlin(
     The sum of `octaves` layers of Perlin noise: layer o has lattice spacing
     `wavelength` / `lacunarity`^o [m] and weight `gain`^o. The lattices start at sample [0, 0] and
     do not depend on `cell`, so that a finer cell samples the same ground. Octaves, lacunarity and
-    gain are those of the first author's code for another robot (Quadruped_MPC_vs_RL); the paper
-    tells none, and the wavelength, about two body lengths, is ours.
+    gain are those of the first author's code for another robot (Quadruped_MPC_vs_RL), as the paper
+    gives none. The wavelength, about two body lengths, is ours.
 
     `GaitshiftError` where a number is out of range or `cell` is longer than half of the shortest
     lattice spacing. Source: Perlin, "Improving Noise", SIGGRAPH 2002, with random unit gradients.
     """
-    AMPLITUDE.check(amplitude)
+    _AMPLITUDE.check(amplitude)
     _WAVELENGTH.check(wavelength)
     _OCTAVES.check(float(octaves))
     _LACUNARITY.check(lacunarity)
@@ -84,3 +83,26 @@ def _gradient_noise(
     lower = (1.0 - across) * plane(0, 0) + across * plane(0, 1)
     upper = (1.0 - across) * plane(1, 0) + across * plane(1, 1)
     return (1.0 - along) * lower + along * upper
+
+
+def smoothstep(t: Float[np.ndarray, "*shape"]) -> Float[np.ndarray, "*shape"]:
+    """6t⁵ − 15t⁴ + 10t³: 0 up to t = 0, 1 from t = 1 on, two continuous derivatives.
+
+    Source: Perlin, "Improving Noise", SIGGRAPH 2002. Its steepest slope is 1.875, at t = 1/2.
+    """
+    t = np.clip(t, 0.0, 1.0)
+    return t * t * t * (t * (6.0 * t - 15.0) + 10.0)
+
+
+KINDS = (
+    Kind(
+        name="perlin",
+        number=_AMPLITUDE,
+        cell=CELL,
+        meaning="fractal noise with this largest |height|; wavelength 1.5 m, 3 octaves",
+        make=lambda number, seed, length, width, cell: perlin(
+            number, seed=seed, length=length, width=width, cell=cell
+        ),
+        rough_from=0.05,  # ours: a trot steps over less
+    ),
+)

@@ -8,15 +8,15 @@ from jaxtyping import Float, Int
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.grid import CELL, FINE_CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.quantity import Quantity, spell
+from gaitshift.sim.terrain.kind import Kind, Quantity, spell
 
-INCLINE = Quantity(name="angle", unit="degrees", low=-45.0, high=45.0)
+_INCLINE = Quantity(name="angle", unit="degrees", low=-45.0, high=45.0)
 """Of a slope. Ours: at 45° feet slip unless friction is above 1."""
 
-RISE = Quantity(name="rise", unit="m", low=0.0, high=1.0)
+_RISE = Quantity(name="rise", unit="m", low=0.0, high=1.0)
 """Of one stair."""
 
-STEP_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
+_STEP_HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
 """Of the single step."""
 
 _RUN = Quantity(name="run", unit="m", low=0.05, high=5.0)
@@ -50,7 +50,7 @@ def slope(
     grid = Grid(length=length, width=width, cell=cell)
     ahead, left = np.cos(np.radians(towards)), np.sin(np.radians(towards))
     along = ahead * grid.x + left * (grid.y - width / 2)[:, None]
-    height = np.tan(np.radians(INCLINE.check(degrees))) * along
+    height = np.tan(np.radians(_INCLINE.check(degrees))) * along
     return grid.terrain(height, name=spell("slope", degrees), origin=origin)
 
 
@@ -80,14 +80,14 @@ def stairs(
 ) -> Terrain:
     """Stairs up to a landing and down again along x, each step `rise` high and `run` deep [m].
 
-    From either end come `landing` metres of level ground at z = 0, then at most `flight` steps up,
-    as many as leave `landing` metres or more on top in the middle. So the ground starts and ends
-    at 0 and is nowhere higher than `flight` × `rise`. A face leans over the cell it lies in.
-    Default run: the tread of a common staircase; flight and landing are ours.
+    Each end has `landing` metres of level ground at z = 0, then at most `flight` steps up, so many
+    that `landing` metres or more remain on top in the middle. So the ground starts and ends at 0
+    and is at most `flight` × `rise` high. A face slopes over the cell in which it lies. The default
+    run is the tread of a common staircase; flight and landing are ours.
 
-    `GaitshiftError` where a number is out of range or not even one step has room.
+    `GaitshiftError` where a number is out of range or the length is too short for one step.
     """
-    RISE.check(rise)
+    _RISE.check(rise)
     _RUN.check(run)
     _FLIGHT.check(float(flight))
     _LANDING.check(landing)
@@ -116,14 +116,61 @@ def step(
 ) -> Terrain:
     """Level ground at 0 and, from the middle of the length on, at `height` [m]: one step up.
 
-    The face leans over the cell it lies in. `GaitshiftError` where a number is out of range.
+    The face slopes over the cell in which it lies. `GaitshiftError` where a number is out of range.
     """
-    STEP_HEIGHT.check(height)
+    _STEP_HEIGHT.check(height)
     grid = Grid(length=length, width=width, cell=cell)
     profile = np.where(_whole(grid.x / (length / 2)) >= 1, height, 0.0)
     return grid.terrain(profile, name=spell("step", height), origin=origin)
 
 
 def _whole(ratio: Float[np.ndarray, "*shape"]) -> Int[np.ndarray, "*shape"]:
-    """Whole part of a ratio of lengths; one that is whole but for rounding is whole."""
+    """Whole part of a ratio of lengths, tolerant of rounding errors."""
     return np.asarray(np.floor(ratio + 1e-9)).astype(int)
+
+
+KINDS = (
+    Kind(
+        name="flat",
+        number=None,
+        cell=CELL,
+        meaning="level ground",
+        make=lambda number, seed, length, width, cell: flat(length, width, cell=cell),
+    ),
+    Kind(
+        name="slope",
+        number=_INCLINE,
+        cell=CELL,
+        meaning="a plane rising along +x; negative: downhill",
+        make=lambda number, seed, length, width, cell: slope(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="bank",
+        number=_INCLINE,
+        cell=CELL,
+        meaning="a plane rising along +y, to walk across",
+        make=lambda number, seed, length, width, cell: bank(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="stairs",
+        number=_RISE,
+        cell=FINE_CELL,
+        meaning="up to ten steps of this height and 0.30 m depth up to a landing, and down again",
+        make=lambda number, seed, length, width, cell: stairs(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+    Kind(
+        name="step",
+        number=_STEP_HEIGHT,
+        cell=FINE_CELL,
+        meaning="one step up, across the middle",
+        make=lambda number, seed, length, width, cell: step(
+            number, length=length, width=width, cell=cell
+        ),
+    ),
+)

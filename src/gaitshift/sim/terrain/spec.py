@@ -1,122 +1,32 @@
 """Terrains written as text: `perlin:0.10`, or a track `flat@8,perlin:0.10@12,flat@10`."""
 
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.sim.terrain.grid import CELL, CELL_RANGE, FINE_CELL, LENGTH, Grid
+from gaitshift.sim.terrain.grid import CELL_RANGE, LENGTH, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.pebbles import PEBBLE_HEIGHT, pebbles
-from gaitshift.sim.terrain.perlin import AMPLITUDE, perlin
-from gaitshift.sim.terrain.quantity import Quantity
-from gaitshift.sim.terrain.shapes import (
-    INCLINE,
-    RISE,
-    STEP_HEIGHT,
-    bank,
-    flat,
-    slope,
-    stairs,
-    step,
-)
+from gaitshift.sim.terrain.kind import Kind, Quantity, Seed
 from gaitshift.sim.terrain.track import track
-
-_Seed = int | np.random.Generator
 
 _TRACK = "flat@8,perlin:0.10@12,flat@10"
 """An example of a track."""
 
-
-@dataclass(frozen=True, kw_only=True)
-class Kind:
-    """A word of the language of specs."""
-
-    name: str
-    """The word."""
-    number: Quantity | None
-    """What stands behind its colon; None where nothing does."""
-    cell: float
-    """Its distance between samples where none is asked for [m]."""
-    meaning: str
-    """One line for `--help`."""
-    make: Callable[[float, _Seed, float, float, float], Terrain]
-    """Ground of a number, seed, length, width and cell [m]; some need no number or no seed."""
-
-    @property
-    def usage(self) -> str:
-        """How it is written: `perlin:AMPLITUDE [0 to 1 m]`."""
-        if self.number is None:
-            return self.name
-        return f"{self.name}:{self.number.name.upper()} [{self.number.range}]"
-
-
-KINDS = (
-    Kind(
-        name="flat",
-        number=None,
-        cell=CELL,
-        meaning="level ground",
-        make=lambda number, seed, length, width, cell: flat(length, width, cell=cell),
-    ),
-    Kind(
-        name="perlin",
-        number=AMPLITUDE,
-        cell=CELL,
-        meaning="fractal noise with this largest |height|; wavelength 1.5 m, 3 octaves",
-        make=lambda number, seed, length, width, cell: perlin(
-            number, seed=seed, length=length, width=width, cell=cell
-        ),
-    ),
-    Kind(
-        name="slope",
-        number=INCLINE,
-        cell=CELL,
-        meaning="a plane rising along +x; negative: downhill",
-        make=lambda number, seed, length, width, cell: slope(
-            number, length=length, width=width, cell=cell
-        ),
-    ),
-    Kind(
-        name="bank",
-        number=INCLINE,
-        cell=CELL,
-        meaning="a plane rising along +y, to walk across",
-        make=lambda number, seed, length, width, cell: bank(
-            number, length=length, width=width, cell=cell
-        ),
-    ),
-    Kind(
-        name="stairs",
-        number=RISE,
-        cell=FINE_CELL,
-        meaning="up to ten steps of this height and 0.30 m depth up to a landing, and down again",
-        make=lambda number, seed, length, width, cell: stairs(
-            number, length=length, width=width, cell=cell
-        ),
-    ),
-    Kind(
-        name="step",
-        number=STEP_HEIGHT,
-        cell=FINE_CELL,
-        meaning="one step up, across the middle",
-        make=lambda number, seed, length, width, cell: step(
-            number, length=length, width=width, cell=cell
-        ),
-    ),
-    Kind(
-        name="pebbles",
-        number=PEBBLE_HEIGHT,
-        cell=FINE_CELL,
-        meaning="round bumps 0.1 to 0.2 m wide, 4 a square metre, the highest this high",
-        make=lambda number, seed, length, width, cell: pebbles(
-            number, seed=seed, length=length, width=width, cell=cell
-        ),
-    ),
+_FILES = (
+    "shapes",
+    "perlin",
+    "pebbles",
 )
-"""Every word that `from_spec` reads; a new kind of ground is one entry more."""
+"""The files beside this one that hold kinds of ground in `KINDS`; a new kind is a file and a line
+here."""
+
+KINDS: tuple[Kind, ...] = tuple(
+    kind for file in _FILES for kind in import_module(f"gaitshift.sim.terrain.{file}").KINDS
+)
+"""Every kind of ground."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +38,7 @@ class _Piece:
     number: float
     length: float | None
 
-    def make(self, seed: _Seed, *, length: float, width: float, cell: float) -> Terrain:
+    def make(self, seed: Seed, *, length: float, width: float, cell: float) -> Terrain:
         try:
             return self.kind.make(self.number, seed, length, width, cell)
         except GaitshiftError as error:
@@ -140,14 +50,14 @@ def from_spec(
 ) -> Terrain:
     """Terrain that a spec describes: one piece, or a track of pieces separated by commas.
 
-    A piece is `NAME`, `NAME:NUMBER`, or either with its length `@METRES` behind it; the names and
-    their numbers are in `KINDS`. One piece alone is `length` [m] long unless it says otherwise; the
-    pieces of a track all say their lengths, which are rounded to whole cells, and `length` does not
-    count. `cell` [m] is the largest distance between samples, if None the finest that a piece asks
-    for. Fields begin at x = 0 with y = 0 in the middle.
+    A piece is `NAME` or `NAME:NUMBER`, optionally followed by its length `@METRES`; the names and
+    their numbers are in `KINDS`. A single piece without a length is `length` [m] long. Every piece
+    of a track needs a length, which is rounded to whole cells; `length` is then ignored. `cell` [m]
+    is the largest distance between samples; None: the finest default of the pieces. Fields begin at
+    x = 0 with y = 0 in the middle.
 
     The same spec, seed and sizes give the same bits. In a track each piece draws from its own
-    stream of the seed, so that changing one piece leaves the noise of the others.
+    stream of the seed, so that a change of one piece does not change the noise of the others.
 
     `GaitshiftError`, one line that names the faulty piece and what is allowed.
     """
@@ -172,9 +82,8 @@ def from_spec(
 
 def spec_help() -> str:
     """Grammar of specs, one line a kind, for the command line's `--help`."""
-    column = max(len(kind.usage) for kind in KINDS)
-    lines = [f"{kind.usage:<{column}}  {kind.meaning}" for kind in KINDS]
-    return "\n".join([*lines, f"pieces in a row, with their lengths in metres: {_TRACK}"])
+    lines = [f"{kind.usage}: {kind.meaning}" for kind in KINDS]
+    return "\n".join([*lines, f"a track, pieces in a row with lengths in metres: {_TRACK}"])
 
 
 _FORM = re.compile(r"(?P<name>[^:@]*)(:(?P<number>[^:@]*))?(@(?P<length>[^:@]*))?")
@@ -213,7 +122,7 @@ def _number(text: str, written: str, quantity: Quantity) -> float:
 
 
 def _whole_cells(piece: _Piece, cell: float) -> float:
-    """Length of a track's piece, rounded to whole cells [m]."""
+    """Length of a piece of a track, rounded to whole cells [m]."""
     if piece.length is None:
         raise _faulty(piece.text, f"every piece of a track must have a length, as in {_TRACK}")
     return max(1, round(piece.length / cell)) * cell

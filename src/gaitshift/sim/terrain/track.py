@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain.height_field import Section, Terrain
-from gaitshift.sim.terrain.quantity import Quantity
-from gaitshift.sim.terrain.smoothstep import smoothstep
+from gaitshift.sim.terrain.kind import Quantity
+from gaitshift.sim.terrain.perlin import smoothstep
 
 _BORDER = Quantity(name="border", unit="m", low=0.1, high=100.0)
 
@@ -29,7 +29,7 @@ def track(
     keep its largest |height|, so that `perlin:0.1` means 0.1 m here as well. Outer edges stay.
 
     Without `origin` the track begins at x = 0 and has y = 0 in its middle. Each piece becomes a
-    section, or several where it is a track itself. The border's default is ours: about one body
+    section, or several where it is a track itself. The default of `border` is ours: about one body
     length of ANYmal.
 
     `GaitshiftError` without pieces, or where their widths or cells differ.

@@ -1,4 +1,4 @@
-"""N robots on a terrain: joint targets in, `Motion` out."""
+"""N robots on a terrain: joint targets in, `Proprioception` and `Privileged` out."""
 
 from gaitshift.sim.world.push import PushConfig as PushConfig
 from gaitshift.sim.world.push import Pusher as Pusher

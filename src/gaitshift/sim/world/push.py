@@ -34,8 +34,8 @@ class PushConfig:
 class Pusher:
     """Draws the present force on each of N robots, step after step.
 
-    Every robot has a clock of its own: pushes begin `interval` steps apart, and the first one in a
-    step drawn from the first `interval - duration`, the first step of all among them.
+    Every robot has its own clock: pushes begin `interval` steps apart. The first push begins in a
+    step drawn from the first `interval - duration` steps, the very first included.
     """
 
     def __init__(self, config: PushConfig, n: int, rng: np.random.Generator) -> None:
@@ -58,7 +58,7 @@ class Pusher:
         return self._force_w
 
     def clear(self, ids: Int[np.ndarray, " K"]) -> None:
-        """Ends the pushes of robots that start anew, and sets them somewhere in a pause."""
+        """Ends the pushes of robots that restart, and draws a new time to their next push."""
         self._force_w[ids] = 0.0
         self._clock[ids] = self._rng.integers(
             self.config.duration, self.config.interval, size=len(ids)

@@ -1,4 +1,4 @@
-"""N robots stepped on all cores: joint targets in, a frozen `Motion` out."""
+"""N robots stepped on all cores: joint targets in, proprioception and privileged state out."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,8 @@ from mujoco.batch import Batch
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
-from gaitshift.robot.motion import Motion, turned
+from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
+from gaitshift.sim.sensors import POSE, TWIST, sense
 from gaitshift.sim.terrain import Terrain
 from gaitshift.sim.world.scene import build_model
 
@@ -19,18 +20,15 @@ CONTACT_FORCE = 1.0
 value of legged_gym."""
 
 CLEAR_OF_GROUND = 20.0
-"""Height at which robots are laid out before they are set down [m]; ours."""
-
-_POSE = 7  # position and quaternion in qpos
-_TWIST = 6  # linear and angular velocity in qvel
+"""Height at which robots are posed before they are set on the ground [m]; ours."""
 
 
 class World:
     """N robots, each alone on its terrain.
 
-    Robots do not feel each other. With several terrains, robot i stands on terrain i mod K.
-    Between calls nothing moves; `motion` is always the present one, no quantity a step late
-    (forces and torques are those of the last physics step, which led here).
+    Robots do not interact. With several terrains, robot i stands on terrain i mod K. Nothing moves
+    between calls. `sensed` and `truth` always describe the present state, without delay (forces and
+    torques are those of the last physics step, which led to this state).
     """
 
     def __init__(
@@ -46,7 +44,7 @@ class World:
 
         Args:
             robot: whose model is simulated.
-            terrain: one for all, or several that the robots share out.
+            terrain: one for all robots, or several among which they are divided.
             n: number of robots.
             gains: preset of joint gains in `robot.gains`.
             threads: physics threads, 0 for all cores.
@@ -62,7 +60,7 @@ class World:
         self.place(np.arange(n), xy=np.zeros((n, 2)), yaw=np.zeros(n))
 
     def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
-        """Exchanges the ground; robots go on as they moved, set down on it where they stood."""
+        """Replaces the ground; robots keep their motion and are moved vertically onto it."""
         terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
         if not terrains:
             raise GaitshiftError("there must be at least one terrain, got none")
@@ -106,19 +104,19 @@ class World:
             base_velocity_w: [m/s].
             base_angular_velocity_b: [rad/s].
         """
-        qpos = np.zeros((len(ids), _POSE + 12))
+        qpos = np.zeros((len(ids), POSE + 12))
         qpos[:, :2] = xy
         qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
         upright = np.tile((1.0, 0.0, 0.0, 0.0), (len(ids), 1))
-        qpos[:, 3:_POSE] = turned(upright if attitude is None else attitude, yaw)
-        qpos[:, _POSE:] = self._stance if joint_position is None else joint_position
+        qpos[:, 3:POSE] = turned(upright if attitude is None else attitude, yaw)
+        qpos[:, POSE:] = self._stance if joint_position is None else joint_position
         self._batch.reset(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self._qpos[ids] = qpos
         self._qvel[ids] = 0.0
         for part, given in (
             (slice(0, 3), base_velocity_w),
-            (slice(3, _TWIST), base_angular_velocity_b),
-            (slice(_TWIST, None), joint_velocity),
+            (slice(3, TWIST), base_angular_velocity_b),
+            (slice(TWIST, None), joint_velocity),
         ):
             if given is not None:
                 self._qvel[ids, part] = given
@@ -132,11 +130,13 @@ class World:
         """Forces on the base origins, world frame [N], until the next call or `place`."""
         self._applied[:, :3] = force_w
 
-    def step(self, target: Float[np.ndarray, "N 12"]) -> Motion:
-        """One control step: joints are driven to `target` [rad], the physics moves on 10 ms.
+    def step(self, target: Float[np.ndarray, "N 12"]) -> tuple[Proprioception, Privileged]:
+        """One control step of 10 ms in which the joints are driven to `target` [rad].
+
+        Returns `sensed` and `truth`.
 
         Raises:
-            GaitshiftError: a target is not finite; nothing has moved then.
+            GaitshiftError: a target is not finite; the state is then unchanged.
         """
         if not np.isfinite(target).all():
             bad = int(np.flatnonzero(~np.isfinite(target).all(axis=1))[0])
@@ -146,31 +146,31 @@ class World:
             )
         self._ctrl[:] = target
         self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
-        self.motion = self._measure()
-        return self.motion
+        self._measure()
+        return self.sensed, self.truth
 
     def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
-        """Copies of qpos and qvel, as logs and videos want them."""
+        """Copies of qpos and qvel."""
         return self._qpos.copy(), self._qvel.copy()
 
-    def _measure(self) -> Motion:
+    def _measure(self) -> None:
+        """Updates `truth` and `sensed`."""
         qpos, qvel, sensors = self._qpos, self._qvel, self._sensors
-        feet = self._feet(sensors)
-        force = sensors[:, 24:28].copy()
-        return Motion(
-            joint_position=qpos[:, _POSE:].copy(),
-            joint_velocity=qvel[:, _TWIST:].copy(),
-            joint_torque=self._torque.copy(),
+        feet, force = self._feet(sensors), sensors[:, 24:28].copy()
+        quaternion = qpos[:, 3:POSE].copy()
+        rotation = rotation_of(quaternion)
+        self.truth = Privileged(
             base_position_w=qpos[:, :3].copy(),
-            base_quaternion_w=qpos[:, 3:_POSE].copy(),
-            base_linear_velocity_w=qvel[:, :3].copy(),
-            base_angular_velocity_b=qvel[:, 3:_TWIST].copy(),
+            base_quaternion_w=quaternion,
+            velocity_b=np.einsum("nij,ni->nj", rotation, qvel[:, :3]),
             foot_position_w=feet,
             foot_velocity_w=sensors[:, 12:24].reshape(-1, 4, 3).copy(),
             foot_force=force,
-            contact=force > CONTACT_FORCE,
             clearance=feet[..., 2] - self._ground(feet[..., :2], None),
             body_contact=sensors[:, 28] > 0.0,
+        )
+        self.sensed = sense(
+            self.truth, rotation, qpos, qvel, self._torque, contact=force > CONTACT_FORCE
         )
 
     def _feet(self, sensors: Float[np.ndarray, "K S"]) -> Float[np.ndarray, "K 4 3"]:
@@ -192,18 +192,18 @@ class World:
         return height
 
     def _settle(self, ids: Int[np.ndarray, " K"]) -> None:
-        """Makes every measured quantity of these robots current."""
-        self._ctrl[ids] = self._qpos[ids, _POSE:]
+        """Updates every measured quantity of these robots."""
+        self._ctrl[ids] = self._qpos[ids, POSE:]
         self._applied[ids] = 0.0
         self._batch.forward(ids=ids)
-        self.motion = self._measure()
+        self._measure()
 
     def _kept_state(
         self, terrains: tuple[Terrain, ...]
     ) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
-        """The present state, lifted or lowered so that no foot stands deeper than before."""
+        """The present state, moved vertically so that no foot penetrates deeper than before."""
         qpos, qvel = self.state()
-        feet = self.motion.foot_position_w[..., :2]
+        feet = self.truth.foot_position_w[..., :2]
         before = self._ground(feet, None)
         self.terrains = terrains[: self.n]
         qpos[:, 2] += (self._ground(feet, None) - before).max(axis=1)

@@ -1,0 +1,33 @@
+"""`gaitshift train`, from check to check."""
+
+from pathlib import Path
+
+from gaitshift.gait import RewardMachine
+from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.run import POLICY, Run
+
+
+class GaitshiftTrainer:
+    """A training run that keeps no record of itself but its policy."""
+
+    def __init__(
+        self, machine: RewardMachine, recipe: Recipe, seed: int, folder: Path, *, iterations: int
+    ) -> None:
+        """Trains by `iterations` at a time; the policy goes into `folder`."""
+        self._run = Run(folder, machine, recipe, seed, "gaitshift bench time-to-gait")
+        self._iterations = iterations
+
+    @property
+    def steps(self) -> int:
+        """Control steps of all robots so far."""
+        return self._run.iteration * self._run.recipe.robots * self._run.recipe.steps
+
+    def advance(self) -> None:
+        """Trains up to the next check."""
+        for _ in range(self._iterations):
+            self._run.iterate()
+
+    def export(self) -> Path:
+        """Writes the policy as it stands."""
+        self._run.export()
+        return self._run.folder / POLICY

@@ -1,0 +1,182 @@
+"""Tables as files: CSV read and written at once, line by line or as a stream, and Markdown."""
+
+import csv
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from gaitshift.errors import GaitshiftError
+
+Row = dict[str, Any]
+"""A line of a table by the names of its columns."""
+Columns = Mapping[str, Callable[[str], Any]]
+"""Names of columns, and what makes a value of a cell's text: `float`, `int`, `str`, …"""
+
+STREAMED = (".csv", ".parquet")
+"""Endings of the files that `stream` reads."""
+
+BATCH, BLOCK = 65_536, 1 << 24
+"""What `stream` reads at a time: rows of a Parquet file, bytes of a CSV file."""
+
+_LINE_END, _GROWING_LINE_END = "\n", "\r\n"
+"""Of tables that are written at once, and of those that grow (RFC 4180)."""
+
+
+# Whole tables ------------------------------------------------------------------------------------
+
+
+def read(path: Path, *, may_be_cut: bool = False) -> list[dict[str, str]]:
+    """The rows of a CSV file, each cell as its text.
+
+    Args:
+        path: the file.
+        may_be_cut: whether a last row with too few cells, as a kill leaves it, is left out.
+
+    Raises:
+        GaitshiftError: the file cannot be read, or a row has other cells than the first line names.
+    """
+    _, rows = _read(path)
+    if may_be_cut and rows and None in rows[-1].values():
+        rows.pop()
+    for number, row in enumerate(rows, start=2):
+        if not _is_whole(row):
+            raise GaitshiftError(f"{path}, line {number} is damaged: its cells do not fit line 1")
+    return rows
+
+
+def read_typed(path: Path, columns: Columns, what: str) -> list[Row]:
+    """The rows of an earlier, perhaps unfinished, table of `what`; none where there is no file.
+
+    An empty cell stays an empty text.
+
+    Raises:
+        GaitshiftError: the file is no such table.
+    """
+    if not path.is_file():
+        return []
+    names, rows = _read(path)
+    if names != tuple(columns) or not all(map(_is_whole, rows)):
+        raise GaitshiftError(f"{path} is not a table of {what}; give another --out, or --overwrite")
+    try:
+        return [{n: kind(row[n]) if row[n] else "" for n, kind in columns.items()} for row in rows]
+    except ValueError as error:
+        raise GaitshiftError(
+            f"{path} is damaged: {error}; give another --out, or --overwrite"
+        ) from error
+
+
+def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = None) -> None:
+    """Writes a CSV file, whole or not at all; without `columns`, those of the first row."""
+    _write(path, rows, tuple(rows[0] if columns is None else columns), _LINE_END)
+
+
+# Tables that grow --------------------------------------------------------------------------------
+
+
+def append(path: Path, row: Row) -> None:
+    """Adds a row to a CSV file, and in a new file the names of the columns above it."""
+    new = not path.exists()
+    with path.open("a", newline="") as file:
+        lines = csv.DictWriter(file, row.keys(), lineterminator=_GROWING_LINE_END)
+        if new:
+            lines.writeheader()
+        lines.writerow(row)
+
+
+def rewrite(path: Path, rows: Sequence[Row]) -> None:
+    """Writes a file that goes on growing, whole or not at all."""
+    _write(path, rows, tuple(rows[0]), _GROWING_LINE_END)
+
+
+# Tables larger than memory -----------------------------------------------------------------------
+
+
+def stream(
+    path: Path, *, numbers: Collection[str], flags: Collection[str]
+) -> Iterator[dict[str, np.ndarray]]:
+    """Batches of the rows of a CSV or Parquet file, as float64 arrays by the names of columns.
+
+    Args:
+        path: the file; one that does not end in .parquet is read as CSV.
+        numbers: columns that are read as numbers, where the file has them.
+        flags: columns that may also hold true and false.
+
+    Raises:
+        GaitshiftError: the file cannot be read, or a column does not hold numbers.
+    """
+    import pyarrow as pa  # only where a large table is read
+    from pyarrow import csv as arrow_csv
+    from pyarrow import parquet
+
+    if not path.is_file():
+        raise GaitshiftError(f"no log file {path}")
+    from_parquet, from_csv = cast(Any, parquet), cast(Any, arrow_csv)
+    arrow = cast(Any, pa)
+    # a number may begin as if it were a whole one, so the type of the first rows is no guide
+    types = {name: arrow.float64() for name in numbers}
+    known = {*numbers, *flags}
+    try:
+        if path.suffix == ".parquet":
+            with from_parquet.ParquetFile(path) as file:
+                for batch in file.iter_batches(BATCH):
+                    yield _arrays(path, batch, known)
+        else:
+            options = from_csv.ReadOptions(block_size=BLOCK)
+            convert = from_csv.ConvertOptions(column_types=types)
+            with from_csv.open_csv(path, read_options=options, convert_options=convert) as file:
+                for batch in file:
+                    yield _arrays(path, batch, known)
+    except UnicodeError as error:
+        raise GaitshiftError(f"{path} must be in UTF-8: {error}") from error
+    except (arrow.ArrowException, OSError) as error:
+        line = (str(error).splitlines() or [type(error).__name__])[0]
+        raise GaitshiftError(f"{path} cannot be read as {path.suffix[1:]}: {line}") from error
+
+
+# Markdown ----------------------------------------------------------------------------------------
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table as Markdown has it, without a line end behind it."""
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
+    """Names of the columns, and rows: None for a cell that is missing, at None those beyond."""
+    try:
+        with path.open(newline="") as file:
+            reader = csv.DictReader(file)
+            rows = list(reader)
+    except OSError as error:
+        raise GaitshiftError(f"{path} cannot be read: {error.strerror}") from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise GaitshiftError(f"{path} is damaged: {error}") from error
+    return tuple(reader.fieldnames or ()), rows
+
+
+def _is_whole(row: Mapping[str, str]) -> bool:
+    return None not in row and None not in row.values()
+
+
+def _write(path: Path, rows: Sequence[Row], columns: tuple[str, ...], line_end: str) -> None:
+    part = path.with_suffix(".part")
+    with part.open("w", newline="") as file:
+        lines = csv.DictWriter(file, columns, lineterminator=line_end)
+        lines.writeheader()
+        lines.writerows(rows)
+    part.replace(path)
+
+
+def _arrays(path: Path, batch: Any, known: Collection[str]) -> dict[str, np.ndarray]:
+    arrays: dict[str, np.ndarray] = {}
+    for name, column in zip(batch.schema.names, batch.columns, strict=True):
+        if name not in known:
+            continue
+        try:
+            arrays[name] = column.cast("float64", safe=False).to_numpy(zero_copy_only=False)
+        except Exception as error:  # arrow has an error for each type
+            raise GaitshiftError(f"{path}: column '{name}' must hold numbers") from error
+    return arrays

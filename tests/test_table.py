@@ -1,0 +1,134 @@
+"""Tables as files: the bytes that are written, what is read back, and what is refused."""
+
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.lab.studies import crossing_table, transition_table
+from gaitshift.table import append, markdown, read, read_typed, rewrite, stream, write
+
+ROOT = Path(__file__).parent.parent
+RESULTS = ROOT / "docs" / "results"
+POLICIES = ROOT / "src" / "gaitshift" / "control" / "policies"
+COMMITTED = sorted([*RESULTS.rglob("*.csv"), *POLICIES.glob("*.csv")])
+
+
+@pytest.mark.parametrize("path", COMMITTED, ids=lambda path: str(path.relative_to(ROOT)))
+def test_a_committed_table_is_written_byte_for_byte_as_it_was_read(path, tmp_path):
+    again = tmp_path / path.name
+    write(again, read(path))
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_a_table_has_a_line_feed_behind_each_row_and_nothing_for_none(tmp_path):
+    path = tmp_path / "table.csv"
+    write(path, [{"a": 1, "b": None}, {"a": "x, y", "b": 0.5}])
+    assert path.read_bytes() == b'a,b\n1,\n"x, y",0.5\n'
+    assert [file.name for file in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_columns_that_are_named_stand_in_their_order_even_without_rows(tmp_path):
+    path = tmp_path / "table.csv"
+    write(path, [], ("b", "a"))
+    assert path.read_bytes() == b"b,a\n"
+    write(path, [{"a": 1, "b": 2}], ("b", "a"))
+    assert path.read_bytes() == b"b,a\n2,1\n"
+
+
+def test_a_table_that_grows_is_the_one_that_the_csv_module_writes(tmp_path):
+    """RFC 4180 ends lines with CR LF, which is the default of Python's writer."""
+    rows = [{"iteration": 1, "stage": "flat", "done": True}, {"iteration": 2, "stage": "a,b"}]
+    path, expected = tmp_path / "progress.csv", io.StringIO(newline="")
+    writer = csv.DictWriter(expected, rows[0].keys())
+    writer.writeheader()
+    writer.writerow(rows[0])
+    append(path, rows[0])
+    assert path.read_bytes() == expected.getvalue().encode()
+    append(path, rows[0])
+    writer.writerow(rows[0])
+    assert path.read_bytes() == expected.getvalue().encode()
+    rewrite(path, read(path))
+    assert path.read_bytes() == expected.getvalue().encode()
+
+
+def test_a_last_row_that_a_kill_cut_short_is_left_out_where_that_may_be(tmp_path):
+    path = tmp_path / "progress.csv"
+    path.write_text("a,b\r\n1,2\r\n3")
+    assert read(path, may_be_cut=True) == [{"a": "1", "b": "2"}]
+    with pytest.raises(GaitshiftError, match=r"progress\.csv, line 3 is damaged"):
+        read(path)
+
+
+@pytest.mark.parametrize("text", ["a,b\n1,2,3\n4,5\n", "a,b\n1\n2,3\n"])
+def test_a_row_of_other_cells_than_the_first_line_names_is_damage(text, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(GaitshiftError, match=r"table\.csv, line 2 is damaged"):
+        read(path, may_be_cut=True)
+
+
+def test_a_file_that_cannot_be_read_is_named(tmp_path):
+    with pytest.raises(GaitshiftError, match=r"none\.csv cannot be read"):
+        read(tmp_path / "none.csv")
+    (tmp_path / "bytes.csv").write_bytes(b"a,b\n\xff,1\n")
+    with pytest.raises(GaitshiftError, match=r"bytes\.csv is damaged"):
+        read(tmp_path / "bytes.csv")
+
+
+def test_typed_rows_are_of_the_columns_and_types_that_were_asked_for(tmp_path):
+    path = tmp_path / "table.csv"
+    columns = {"name": str, "count": int, "share": float}
+    assert read_typed(path, columns, "counts") == []
+    rows = [{"name": "a", "count": 3, "share": 0.25}, {"name": "b", "count": 4, "share": ""}]
+    write(path, rows, columns)
+    assert read_typed(path, columns, "counts") == rows
+    for wrong in ({"name": str, "count": int}, columns | {"count": lambda text: int(text + "x")}):
+        with pytest.raises(GaitshiftError):
+            read_typed(path, wrong, "counts")
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_stream_gives_the_known_columns_as_numbers(ending, tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    columns = {"time": [0, 1.5, 3], "down": [True, False, True], "note": ["x", "y", "z"]}
+    path = tmp_path / f"log.{ending}"
+    if ending == "csv":
+        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+        write(path, rows)
+    else:
+        from pyarrow import parquet
+
+        columns["time"] = [0.0, 1.5, 3.0]
+        parquet.write_table(pyarrow.table(columns), path)
+    (batch,) = stream(path, numbers=("time", "absent"), flags=("down",))
+    assert set(batch) == {"time", "down"}
+    np.testing.assert_array_equal(batch["time"], [0.0, 1.5, 3.0])
+    np.testing.assert_array_equal(batch["down"], [1.0, 0.0, 1.0])
+
+
+def test_a_markdown_table_has_a_head_a_rule_and_a_line_a_row():
+    assert markdown(("a", "b"), [("1", "2"), ("3", "")]) == (
+        "| a | b |\n| --- | --- |\n| 1 | 2 |\n| 3 |  |"
+    )
+
+
+@pytest.mark.parametrize(
+    ("folder", "name", "study"),
+    [
+        ("transitions", "transitions.csv", transition_table),
+        ("transitions-all", "transitions.csv", transition_table),
+        ("study", "crossings.csv", crossing_table),
+    ],
+)
+def test_a_study_makes_the_committed_tables_of_its_rows(folder, name, study):
+    rows = read_typed(RESULTS / "shifting" / folder / name, study.COLUMNS, "rows")
+    committed = (RESULTS / "shifting" / folder / "README.md").read_text()
+    assert _tables(study.page(rows, "a command")) == _tables(committed)
+
+
+def _tables(page: str) -> list[str]:
+    return [line for line in page.splitlines() if line.startswith("|")]

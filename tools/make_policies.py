@@ -1,0 +1,48 @@
+"""Trains the shipped policies anew, each by the preset and seed that its record names.
+
+Usage: python tools/make_policies.py [GAIT...]
+
+The records are src/gaitshift/control/policies/GAIT.json. A training takes 5 to 15 minutes; one that
+is over is not repeated. `tools/ship_policy.py` then puts the policies into the package.
+"""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+from gaitshift.control import policy
+from gaitshift.errors import GaitshiftError
+
+RUNS = Path("runs")
+
+
+def commands(gait: str) -> tuple[Path, list[str]]:
+    """The folder of the run, and the words of the command that trains the shipped policy."""
+    record = json.loads(policy.record_file(gait).read_text())
+    preset, seed = record["preset"], str(record["seed"])
+    folder = RUNS / f"{gait}-{seed}"
+    if (folder / "config.json").is_file():
+        return folder, ["train", "--resume", str(folder)]
+    asked = ["train", gait, "--preset", preset, "--seed", seed, "--threads", "1"]
+    return folder, [*asked, "--out", str(folder)]
+
+
+def main(gaits: list[str]) -> None:
+    """Trains one after the other, and ships all."""
+    unknown = [gait for gait in gaits if gait not in policy.shipped()]
+    if unknown:
+        raise GaitshiftError(
+            f"gaits must be some of {', '.join(policy.shipped())}, got '{unknown[0]}'"
+        )
+    folders: list[str] = []
+    for gait in gaits or policy.shipped():
+        folder, words = commands(gait)
+        folders.append(str(folder))
+        subprocess.run([sys.executable, "-m", "gaitshift", *words], check=True)
+    ship = Path(__file__).with_name("ship_policy.py")
+    subprocess.run([sys.executable, str(ship), *folders], check=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
