@@ -1,4 +1,4 @@
-"""What shift conditions watch: one statistic a file, and its line here."""
+"""What shift conditions watch: a new statistic is one file, and its line here."""
 
 from typing import Any
 
@@ -8,16 +8,18 @@ from jaxtyping import Bool, Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift.statistic import AnyStatistic
-from gaitshift.shift.statistics.attitude import AttitudeVariance
-from gaitshift.shift.statistics.energy import CostOfTransport
 from gaitshift.shift.statistics.height_difference import HeightDifference
 from gaitshift.shift.statistics.oracle import Oracle
 from gaitshift.shift.statistics.plane import PlaneResidual
-from gaitshift.shift.statistics.slip import Slip
-from gaitshift.shift.statistics.speed import SpeedCommand
+from gaitshift.shift.statistics.rivals import (
+    AttitudeVariance,
+    ContactTiming,
+    CostOfTransport,
+    Slip,
+    SpeedCommand,
+    ValueDrop,
+)
 from gaitshift.shift.statistics.surprise import TouchdownSurprise
-from gaitshift.shift.statistics.timing import ContactTiming
-from gaitshift.shift.statistics.value_drop import ValueDrop
 
 STATISTICS: dict[str, type[Any]] = {
     "height_difference": HeightDifference,
