@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.studies import crossing_table, transition_table
+from gaitshift.lab.studies import crossing, transitions
 from gaitshift.table import append, markdown, read, read_typed, rewrite, stream, write
 
 ROOT = Path(__file__).parent.parent
@@ -119,9 +119,9 @@ def test_a_markdown_table_has_a_head_a_rule_and_a_line_a_row():
 @pytest.mark.parametrize(
     ("folder", "name", "study"),
     [
-        ("transitions", "transitions.csv", transition_table),
-        ("transitions-all", "transitions.csv", transition_table),
-        ("study", "crossings.csv", crossing_table),
+        ("transitions", "transitions.csv", transitions),
+        ("transitions-all", "transitions.csv", transitions),
+        ("study", "crossings.csv", crossing),
     ],
 )
 def test_a_study_makes_the_committed_tables_of_its_rows(folder, name, study):

@@ -35,7 +35,7 @@ frequency, the first 2 s left out. `gaitshift.gait_analysis` defines the figures
 by `tools/gait_results.py` from the records beside the policies.
 
 - *Clean*: the contacts are those of the gait, and every limit is kept. Trot, pace and bound have
-  stricter limits than the others (`src/gaitshift/lab/gait_analysis/limits.py`). The others have
+  stricter limits than the others (`src/gaitshift/lab/gait_analysis/verdict.py`). The others have
   none on noise of 0.15 m and more, slopes, stairs and steps
   (`src/gaitshift/lab/evaluation/trials.py`).
 - *Cycles*: rounds of the machine a second.

@@ -25,9 +25,8 @@ from gaitshift.gait import RewardMachine, gaits
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
 from gaitshift.lab.gait_analysis import FIRST_GAITS
 from gaitshift.lab.identification.statistics import wilson
-from gaitshift.lab.reproduction.plan import Job
-from gaitshift.lab.reproduction.pool import train_all
-from gaitshift.lab.reproduction.settings import Setting
+from gaitshift.lab.reproduction.plan import Job, Setting
+from gaitshift.lab.reproduction.training import train_all
 from gaitshift.lab.studies.transitions import Pair, run_pair
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import POLICY

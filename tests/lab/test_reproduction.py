@@ -11,9 +11,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.reproduction.findings import findings
 from gaitshift.lab.reproduction.learning_curve import LearningCurve, median_iteration
-from gaitshift.lab.reproduction.plan import Plan
+from gaitshift.lab.reproduction.plan import ABLATIONS, AS_IN_THE_PAPER, REFERENCE, Plan
 from gaitshift.lab.reproduction.results import EarlierRuns, Results, Seeds
-from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER, REFERENCE
 from gaitshift.lab.reproduction.tables import curve_rows, run_rows
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import Run

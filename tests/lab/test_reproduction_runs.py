@@ -17,11 +17,9 @@ from rsl_rl.algorithms import PPO
 from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.reproduction.learning_curve import LearningCurve
-from gaitshift.lab.reproduction.plan import Plan
-from gaitshift.lab.reproduction.pool import train_all
+from gaitshift.lab.reproduction.plan import ABLATIONS, Plan
 from gaitshift.lab.reproduction.results import Results
-from gaitshift.lab.reproduction.settings import ABLATIONS
-from gaitshift.lab.reproduction.training import FAILED, is_over, train
+from gaitshift.lab.reproduction.training import FAILED, is_over, train, train_all
 from gaitshift.learn.learner import DivergedError
 from gaitshift.learn.run import Run
 from waiting import PATIENCE, wait_until

@@ -11,8 +11,15 @@ from scipy import stats
 from gaitshift.cli import main
 from gaitshift.control import policy
 from gaitshift.lab.evaluation import DemoConfig, run_demo
-from gaitshift.lab.studies.crossing import Crossings, cross, measure_crossings, strategies
-from gaitshift.lab.studies.crossing_table import COLUMNS, mean_of, row_of
+from gaitshift.lab.studies.crossing import (
+    COLUMNS,
+    Crossings,
+    cross,
+    mean_of,
+    measure_crossings,
+    row_of,
+    strategies,
+)
 from gaitshift.show.plots.studies import crossings_figure
 from synthetic import changed
 

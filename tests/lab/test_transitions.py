@@ -10,8 +10,7 @@ from gaitshift.cli import main
 from gaitshift.control import policy
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.studies import Pair, run_pair
-from gaitshift.lab.studies.transition_table import COLUMNS
-from gaitshift.lab.studies.transitions import measure_shifts, running_mean
+from gaitshift.lab.studies.transitions import COLUMNS, measure_shifts, running_mean
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.show.plots.studies import transition_map
 from gaitshift.table import read_typed

@@ -5,7 +5,7 @@ import numpy as np
 
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.sim.terrain import step
-from gaitshift.sim.world.scene import build_model
+from gaitshift.sim.world.world import build_model
 
 
 def test_a_robot_that_lies_on_an_edge_has_memory_for_all_of_its_contacts():

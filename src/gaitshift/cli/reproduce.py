@@ -43,8 +43,8 @@ class Reproduce:
         """Trains what is missing, and writes the report."""
         try:
             from gaitshift.lab.reproduction.plan import Plan
-            from gaitshift.lab.reproduction.pool import train_all
             from gaitshift.lab.reproduction.results import EarlierRuns, Results
+            from gaitshift.lab.reproduction.training import train_all
             from gaitshift.show.report.reproduction import write_report
         except ImportError as error:
             raise GaitshiftError(

@@ -55,8 +55,15 @@ class Study(RobotOptions):
     def run(self) -> None:
         """Crosses, and tells what came of it."""
         try:
-            from gaitshift.lab.studies.crossing import Strategy, cross, strategies
-            from gaitshift.lab.studies.crossing_table import COLUMNS, PICTURE, page, row_of
+            from gaitshift.lab.studies.crossing import (
+                COLUMNS,
+                PICTURE,
+                Strategy,
+                cross,
+                page,
+                row_of,
+                strategies,
+            )
         except ImportError as error:
             raise GaitshiftError(
                 f"study needs the package '{error.name}'; install gaitshift[identify]"

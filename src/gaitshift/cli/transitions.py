@@ -56,7 +56,7 @@ class Transitions(RobotOptions):
         """Shifts, and tells what came of it."""
         try:
             from gaitshift.lab.studies import Pair, run_pair
-            from gaitshift.lab.studies.transition_table import COLUMNS, page, row_of
+            from gaitshift.lab.studies.transitions import COLUMNS, page, row_of
         except ImportError as error:
             raise GaitshiftError(
                 f"transitions needs the package '{error.name}'; install gaitshift[identify]"
@@ -114,7 +114,7 @@ class Transitions(RobotOptions):
 
     def _draw(self, rows: list[dict[str, Any]]) -> None:
         """A map a ground, of all that the table has."""
-        from gaitshift.lab.studies.transition_table import picture_of
+        from gaitshift.lab.studies.transitions import picture_of
         from gaitshift.show.plots.studies import transition_map  # matplotlib is slow to import
 
         for ground in dict.fromkeys(row["ground"] for row in rows):

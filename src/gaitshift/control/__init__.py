@@ -1,10 +1,10 @@
 """What drives robots: policies and oscillators, and who changes their gaits."""
 
 from gaitshift.control.controller import Controller as Controller
+from gaitshift.control.controller import Repertoire as Repertoire
 from gaitshift.control.controllers import CONTROLLERS as CONTROLLERS
 from gaitshift.control.driver import Driver as Driver
 from gaitshift.control.policy import Policy as Policy
-from gaitshift.control.repertoire import Repertoire as Repertoire
 from gaitshift.control.switcher import Autonomous as Autonomous
 from gaitshift.control.switcher import Scheduled as Scheduled
 from gaitshift.control.switcher import Switcher as Switcher

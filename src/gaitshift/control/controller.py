@@ -1,14 +1,67 @@
-"""What drives robots, learned or not: all that rollouts, conditions and switchers know of it."""
+"""What drives robots, learned or not, and the gaits that it knows."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
-from gaitshift.control.repertoire import Repertoire
+from gaitshift.data import known_names
+from gaitshift.errors import GaitshiftError
+from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import Command
 from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Proprioception
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Repertoire:
+    """G gaits in a fixed order; robots carry an index into it."""
+
+    gaits: tuple[str, ...]
+    """Their names."""
+    machines: tuple[RewardMachine, ...]
+    """Their machines."""
+    forward_speed: Float[np.ndarray, " G"]
+    """Their nominal speeds [m/s]."""
+    stride_frequency: Float[np.ndarray, " G"]
+    """Their nominal cycles a second [Hz]."""
+
+    def index(self, gait: str) -> int:
+        """Index of a gait.
+
+        Raises:
+            GaitshiftError: it is not among them.
+        """
+        if gait not in self.gaits:
+            raise GaitshiftError(known_names("gait", gait, self.gaits))
+        return self.gaits.index(gait)
+
+    def groups(self, gait: Int[np.ndarray, " N"]) -> Iterator[tuple[int, Int[np.ndarray, " K"]]]:
+        """The gaits in use, each with the robots that are in it."""
+        if (gait == gait[0]).all():
+            yield int(gait[0]), np.arange(len(gait))
+            return
+        for index in np.unique(gait).tolist():
+            yield index, np.flatnonzero(gait == index)
+
+    def own_command(self, gait: Int[np.ndarray, " N"]) -> Command:
+        """Straight ahead, at the nominal speed and stride frequency of each robot's gait."""
+        return Command(
+            forward_speed=self.forward_speed[gait],
+            yaw_rate=np.zeros(len(gait)),
+            stride_frequency=self.stride_frequency[gait],
+        )
+
+    def stance_shown(
+        self, gait: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Whether the feet in contact are a stance set of each robot's gait."""
+        shown = np.empty(len(gait), dtype=bool)
+        for index, ids in self.groups(gait):
+            shown[ids] = self.machines[index].shows_stance(contact[ids])
+        return shown
 
 
 @runtime_checkable

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from gaitshift.control import policy as policies
+from gaitshift.control.controller import Repertoire
 from gaitshift.control.observation import GaitState
 from gaitshift.control.policy import Policy
-from gaitshift.control.repertoire import Repertoire
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import Command
 from gaitshift.robot.description import ANYMAL_B, Robot

@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from gaitshift.control.cpg.gait import GAITS
+from gaitshift.control.controller import Repertoire
 from gaitshift.control.cpg.kinematics import FORE, SIDE, joint_angles, lift_torques
-from gaitshift.control.cpg.oscillators import HopfNetwork, phase_of
-from gaitshift.control.repertoire import Repertoire
+from gaitshift.control.cpg.oscillators import GAITS, HopfNetwork, phase_of
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait.gaits import load
 from gaitshift.robot.command import CONTROL_PERIOD, Command

@@ -18,7 +18,7 @@ from gaitshift.lab.evaluation.evaluate import (
     run_policy,
 )
 from gaitshift.lab.gait_analysis import Check, checks
-from gaitshift.lab.gait_analysis.limits import FIRST, limits_of
+from gaitshift.lab.gait_analysis.verdict import FIRST, limits_of
 from gaitshift.lab.log import Log
 
 BATCH = 1_000_000

@@ -8,6 +8,8 @@ import numpy as np
 
 from gaitshift.lab.reproduction.plan import (
     ABLATED,
+    ABLATIONS,
+    AS_IN_THE_PAPER,
     GAITS,
     LEARNED_BY,
     PLATEAU,
@@ -15,7 +17,6 @@ from gaitshift.lab.reproduction.plan import (
     ZERO_CROSSING,
 )
 from gaitshift.lab.reproduction.results import Results, Seeds
-from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER
 
 Verdict = Literal["holds", "holds in part", "does not hold"]
 

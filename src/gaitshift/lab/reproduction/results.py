@@ -17,8 +17,7 @@ from gaitshift.lab.reproduction.learning_curve import (
     LearningCurve,
     median_iteration,
 )
-from gaitshift.lab.reproduction.plan import ABLATED, GAITS, Job, Plan
-from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER
+from gaitshift.lab.reproduction.plan import ABLATED, ABLATIONS, GAITS, PAPER, Job, Plan
 from gaitshift.lab.reproduction.training import FAILED, is_over
 from gaitshift.learn.run import PROGRESS
 

@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 from gaitshift.lab.reproduction.judging import JudgedPolicy
 from gaitshift.lab.reproduction.learning_curve import DECIMALS
-from gaitshift.lab.reproduction.plan import ABLATED
+from gaitshift.lab.reproduction.plan import ABLATED, ABLATIONS, PAPER, REFERENCE, Setting
 from gaitshift.lab.reproduction.results import Results, Seeds, fingerprint
-from gaitshift.lab.reproduction.settings import ABLATIONS, PAPER, REFERENCE, Setting
 from gaitshift.table import Row
 
 ABLATED_RUNS = "ablations.csv"

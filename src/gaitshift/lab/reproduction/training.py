@@ -1,6 +1,14 @@
-"""One job trained to its end, whatever became of it before."""
+"""Jobs trained to their end, on as many processes as wanted, whatever became of them before."""
 
 import json
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -86,3 +94,82 @@ def _check_same(job: Job, folder: Path) -> None:
             raise GaitshiftError(
                 f"{folder} is a run with another {name}; give another --runs, or remove it"
             )
+
+
+LOOK_EVERY = 1.0
+"""Seconds between two looks at how far the runs are."""
+
+
+def train_all(
+    jobs: Sequence[Job],
+    runs: Path,
+    processes: int,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Trains what is not over yet, each job in the folder of its name below `runs`.
+
+    `report` is called with the iterations done and those that were left at the start. Whatever
+    ends this ends the processes too; the same call goes on from the last checkpoints.
+
+    Raises:
+        GaitshiftError: a folder holds another run, or a process was killed.
+    """
+    left = [job for job in jobs if not is_over(job, runs / job.name)]
+    if not left:
+        return
+    before = {job.name: iterations_done(runs / job.name) for job in left}
+    total = sum(job.recipe.iterations - before[job.name] for job in left)
+    executor = ProcessPoolExecutor(
+        max_workers=min(processes, len(left)),
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_end_with_parent,
+    )
+    try:
+        with _interrupts_ignored():  # the processes inherit it: Ctrl-C is for this one to answer
+            waiting = {executor.submit(train, job, runs / job.name) for job in left}
+        while waiting:
+            ended, waiting = wait(waiting, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED)
+            _raise_first(ended)
+            report(sum(_new_iterations(job, runs, before) for job in left), total)
+    except BrokenProcessPool:
+        raise GaitshiftError(
+            "a training process was killed, perhaps out of memory; run the same command to resume"
+        ) from None
+    finally:
+        for process in multiprocessing.active_children():
+            process.terminate()
+        executor.shutdown(cancel_futures=True)
+
+
+def _new_iterations(job: Job, runs: Path, before: dict[str, int]) -> int:
+    """Iterations since the start of this command; all that were left where a run broke down."""
+    folder = runs / job.name
+    if (folder / FAILED).is_file():
+        return job.recipe.iterations - before[job.name]
+    return max(0, iterations_done(folder) - before[job.name])
+
+
+def _raise_first(ended: set[Future[None]]) -> None:
+    for future in ended:
+        future.result()
+
+
+@contextmanager
+def _interrupts_ignored() -> Generator[None]:
+    kept = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, kept)
+
+
+def _end_with_parent() -> None:
+    """Lets no process outlive the command, not even one that was killed."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def watch() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

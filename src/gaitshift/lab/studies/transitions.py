@@ -1,6 +1,6 @@
 """One gait swapped for another in an instant, at every phase of the stride: what comes of it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -12,12 +12,14 @@ from gaitshift.control.policy import Policy
 from gaitshift.control.switcher import uncounted
 from gaitshift.lab.evaluation.evaluate import grounds_of, starts
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.lab.identification import wilson
 from gaitshift.lab.log import Log
 from gaitshift.lab.studies.batches import in_batches
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 from gaitshift.shift import Decision
 from gaitshift.sim.world import World
+from gaitshift.table import Row, markdown
 
 GROUNDS = ("flat", "perlin:0.10")
 """Specs of the grounds that shifts are tried on."""
@@ -168,3 +170,112 @@ def _phase(
     last = np.maximum.accumulate(steps, axis=0)[at, np.arange(len(at))]
     stride = 1.0 / (old.info.stride_frequency * CONTROL_PERIOD)
     return ((at - last) / stride) % 1.0
+
+
+PHASES = 10
+"""Parts that the stride is cut into."""
+
+COLUMNS: dict[str, type] = {
+    "old": str,
+    "new": str,
+    "ground": str,
+    "seed": int,
+    "switches": int,
+    "successes": int,
+    "low": float,
+    "high": float,
+    "fell": int,
+    "settle_s": float,
+    "settle_s_p95": float,
+    "dip_m_s": float,
+    "tilt_deg_p95": float,
+    "worst_phase": str,
+    "worst_phase_success": float,
+}
+"""Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
+
+_INTRODUCTION = """# Gait shifts at a random phase
+
+Policy and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds
+if the robot does not fall within 5 s and, from some stride on, the contacts match the new gait in
+at least half of the steps of every stride. Settle time ends with the first such stride. Dip is the
+largest drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 %
+Wilson intervals."""
+
+HEAD = (
+    "from",
+    "to",
+    "succeeded",
+    "interval",
+    "fell",
+    "settled, 95 % within [s]",
+    "dip [m/s]",
+    "tilt, 95 % within [°]",
+    "worst phase",
+)
+"""Above the cells of `row_cells`."""
+
+
+def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
+    """What came of the shifts of a pair."""
+    n, good = len(outcomes.success), int(outcomes.success.sum())
+    low, high = wilson(np.array([float(good)]), np.array([float(n)]))
+    settled = outcomes.settle[outcomes.success]
+    parts = np.minimum((outcomes.phase * PHASES).astype(int), PHASES - 1)
+    shares = [
+        float(outcomes.success[parts == part].mean()) if (parts == part).any() else 1.0
+        for part in range(PHASES)
+    ]
+    worst = int(np.argmin(shares))
+    return {
+        "old": pair.old,
+        "new": pair.new,
+        "ground": ground,
+        "seed": seed,
+        "switches": n,
+        "successes": good,
+        "low": round(float(low[0]), 5),
+        "high": round(float(high[0]), 5),
+        "fell": int(outcomes.fell.sum()),
+        "settle_s": round(float(np.median(settled)), 2) if good else "",
+        "settle_s_p95": round(float(np.quantile(settled, 0.95)), 2) if good else "",
+        "dip_m_s": round(float(outcomes.dip.mean()), 3),
+        "tilt_deg_p95": round(float(np.degrees(np.quantile(outcomes.tilt, 0.95))), 1),
+        "worst_phase": f"{worst / PHASES:g} to {(worst + 1) / PHASES:g}",
+        "worst_phase_success": round(shares[worst], 4),
+    }
+
+
+def page(rows: Sequence[Row], command: str) -> str:
+    """The whole page; `command` made the last of the rows."""
+    parts = [_INTRODUCTION, f"Made by `{command}`. The same as an [interactive page](page.html)."]
+    for ground in dict.fromkeys(row["ground"] for row in rows):
+        of = [row for row in rows if row["ground"] == ground]
+        total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
+        parts += [
+            f"## {ground}",
+            f"{good} of {total} shifts succeeded.",
+            f"![Failed shifts on {ground}]({picture_of(ground)})",
+            markdown(HEAD, [row_cells(row) for row in of]),
+        ]
+    return "\n\n".join(parts) + "\n"
+
+
+def picture_of(ground: str) -> str:
+    """File name of the map of a ground."""
+    return f"{ground.replace(':', '-')}.png"
+
+
+def row_cells(row: Row) -> tuple[str, ...]:
+    """A row of the table of shifts as text."""
+    return (
+        row["old"],
+        row["new"],
+        f"{row['successes']} of {row['switches']}",
+        f"{row['low']:.4f} to {row['high']:.4f}",
+        str(row["fell"]),
+        str(row["settle_s_p95"]),
+        f"{row['dip_m_s']:.2f}",
+        f"{row['tilt_deg_p95']:.0f}",
+        f"{row['worst_phase']}: {row['worst_phase_success']:.3f}",
+    )

@@ -1,4 +1,4 @@
-"""What shift conditions watch: one statistic a file, and its line here."""
+"""What shift conditions watch: a new statistic is one file, and its line here."""
 
 from pkgutil import resolve_name
 from typing import Any
@@ -15,12 +15,12 @@ _STATISTICS = {
     "height_difference": "gaitshift.shift.statistics.height_difference:HeightDifference",
     "plane_residual": "gaitshift.shift.statistics.plane:PlaneResidual",
     "touchdown_surprise": "gaitshift.shift.statistics.surprise:TouchdownSurprise",
-    "attitude_variance": "gaitshift.shift.statistics.attitude:AttitudeVariance",
-    "contact_timing": "gaitshift.shift.statistics.timing:ContactTiming",
-    "slip": "gaitshift.shift.statistics.slip:Slip",
-    "cost_of_transport": "gaitshift.shift.statistics.energy:CostOfTransport",
-    "value_drop": "gaitshift.shift.statistics.value_drop:ValueDrop",
-    "speed": "gaitshift.shift.statistics.speed:SpeedCommand",
+    "attitude_variance": "gaitshift.shift.statistics.rivals:AttitudeVariance",
+    "contact_timing": "gaitshift.shift.statistics.rivals:ContactTiming",
+    "slip": "gaitshift.shift.statistics.rivals:Slip",
+    "cost_of_transport": "gaitshift.shift.statistics.rivals:CostOfTransport",
+    "value_drop": "gaitshift.shift.statistics.rivals:ValueDrop",
+    "speed": "gaitshift.shift.statistics.rivals:SpeedCommand",
     "oracle": "gaitshift.shift.statistics.oracle:Oracle",
 }
 

@@ -5,9 +5,14 @@ from pathlib import Path
 
 from gaitshift.lab.log import Log
 from gaitshift.lab.reproduction.judging import JudgedPolicy, middle
-from gaitshift.lab.reproduction.plan import PLATEAU, START, ZERO_CROSSING
+from gaitshift.lab.reproduction.plan import (
+    ABLATIONS,
+    AS_IN_THE_PAPER,
+    PLATEAU,
+    START,
+    ZERO_CROSSING,
+)
 from gaitshift.lab.reproduction.results import Results, Seeds
-from gaitshift.lab.reproduction.settings import ABLATIONS, AS_IN_THE_PAPER
 from gaitshift.robot.command import PAPER_SPEED
 from gaitshift.show.plots import contact_diagram
 from gaitshift.show.plots.learning import Courses, Landmarks, comparison_curves, reward_curves

@@ -10,6 +10,7 @@ from gaitshift.lab.reproduction import tables
 from gaitshift.lab.reproduction.findings import Finding, findings
 from gaitshift.lab.reproduction.judging import JudgedPolicy, judge
 from gaitshift.lab.reproduction.learning_curve import HELD_FOR, WALKING_CHANGES, WALKING_SPEED
+from gaitshift.lab.reproduction.plan import LOCKOUT
 from gaitshift.lab.reproduction.results import (
     CURVES_FILE,
     GAITS_FILE,
@@ -17,7 +18,6 @@ from gaitshift.lab.reproduction.results import (
     EarlierRuns,
     Results,
 )
-from gaitshift.lab.reproduction.settings import LOCKOUT
 from gaitshift.show.plots import reproduction as figures
 from gaitshift.table import Row, markdown, write
 

@@ -17,7 +17,7 @@ from gaitshift.lab.identification.report import (
     course_rows,
     hardest_first,
 )
-from gaitshift.lab.studies.transition_table import HEAD, row_cells
+from gaitshift.lab.studies.transitions import HEAD, row_cells
 from gaitshift.show.plots.identification import FALSE, LATEST, LINES, NOTICED, OTHERS, roc
 from gaitshift.show.plots.style import gait_colours
 from gaitshift.show.report.data import title_of
@@ -77,7 +77,7 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
     """Writes the page of shifts: a map and a table a ground.
 
     Args:
-        rows: of the table of shifts (`studies.transition_table`).
+        rows: of the table of shifts (`studies.transitions.row_of`).
         path: the HTML file.
         command: what made the last of them.
     """

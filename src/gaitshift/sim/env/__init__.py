@@ -6,10 +6,10 @@ the colon. After `import gaitshift.sim.env` the id needs no module. (Gymnasium 1
 points by which installed packages registered their environments.)
 """
 
+from gaitshift.sim.env.config import Curriculum as Curriculum
 from gaitshift.sim.env.config import EnvConfig as EnvConfig
-from gaitshift.sim.env.curriculum import Curriculum as Curriculum
 from gaitshift.sim.env.gait_env import GaitEnv as GaitEnv
+from gaitshift.sim.env.registry import SingleGaitEnv as SingleGaitEnv
 from gaitshift.sim.env.registry import register_gaits as register_gaits
-from gaitshift.sim.env.single import SingleGaitEnv as SingleGaitEnv
 
 register_gaits()

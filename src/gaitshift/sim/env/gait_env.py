@@ -17,8 +17,7 @@ from gaitshift.robot.command import ACTION_LIMIT
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged
 from gaitshift.sim.env.commander import Commander
-from gaitshift.sim.env.config import EnvConfig
-from gaitshift.sim.env.curriculum import Curriculum
+from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.mixed_start import MixedStart, mix
 from gaitshift.sim.env.swings import Swings
 from gaitshift.sim.reward import earned_bonus, walk_reward, with_bonus

@@ -1,12 +1,59 @@
-"""The Gymnasium ids of the gaits: `gaitshift/trot-v0` and so on."""
+"""The Gymnasium ids of the gaits, such as `gaitshift/trot-v0`, of N robots or one."""
+
+from typing import Any
 
 import gymnasium as gym
+import numpy as np
+from jaxtyping import Float, Float32
 
-from gaitshift.gait import gaits
+from gaitshift.gait import RewardMachine, gaits
+from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.sim.env.config import EnvConfig
 from gaitshift.sim.env.gait_env import GaitEnv
-from gaitshift.sim.env.single import SingleGaitEnv
-from gaitshift.sim.terrain import from_spec
+from gaitshift.sim.terrain import Terrain, from_spec
+
+
+class SingleGaitEnv(gym.Env[np.ndarray, np.ndarray]):
+    """A `GaitEnv` of one robot, without the axis of robots and without autoreset."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012  (Gymnasium wants a plain dict here)
+
+    def __init__(
+        self,
+        machine: RewardMachine,
+        terrain: Terrain,
+        *,
+        config: EnvConfig | None = None,
+        robot: Robot = ANYMAL_B,
+    ) -> None:
+        self.vector = GaitEnv(machine, terrain, 1, config=config, robot=robot, threads=1)
+        self.observation_space = self.vector.single_observation_space
+        self.action_space = self.vector.single_action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Float32[np.ndarray, " D"], dict[str, Any]]:
+        """Starts an episode."""
+        super().reset(seed=seed)
+        observation, info = self.vector.reset(seed=seed, options=options)
+        return observation[0], info
+
+    def step(
+        self, action: Float[np.ndarray, " 12"]
+    ) -> tuple[Float32[np.ndarray, " D"], float, bool, bool, dict[str, Any]]:
+        """One control step of 10 ms."""
+        observation, reward, terminated, truncated, info = self.vector.step(action[None])
+        ended = bool(terminated[0] or truncated[0])
+        last = info["final_obs"][0] if ended else observation[0]
+        terms = {name: float(term[0]) for name, term in info["reward_terms"].items()}
+        return (
+            last,
+            float(reward[0]),
+            bool(terminated[0]),
+            bool(truncated[0]),
+            {"reward_terms": terms, "changed": bool(info["changed"][0])},
+        )
+
 
 _FIELD = 20.0
 """Side of the ground of a registered environment [m]; ours: an episode of 10 s stays on it."""

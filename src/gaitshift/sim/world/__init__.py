@@ -2,5 +2,5 @@
 
 from gaitshift.sim.world.push import PushConfig as PushConfig
 from gaitshift.sim.world.push import Pusher as Pusher
-from gaitshift.sim.world.scene import build_model as build_model
 from gaitshift.sim.world.world import World as World
+from gaitshift.sim.world.world import build_model as build_model

@@ -9,11 +9,41 @@ from mujoco.batch import Batch
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import Robot
+from gaitshift.robot.description import Gains, Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.sensors import POSE, TWIST, sense
-from gaitshift.sim.terrain import Terrain
-from gaitshift.sim.world.scene import build_model
+from gaitshift.sim.terrain import Terrain, to_unit_interval
+
+GROUND = "ground"
+"""Name of the ground's geom."""
+
+FRICTION = 0.8
+"""Sliding friction of the ground, as in the robot's URDF; the robot's own shapes have priority."""
+
+
+def build_model(robot: Robot, gains: Gains, terrain: Terrain) -> mujoco.MjModel:
+    """The model of one robot on one terrain.
+
+    Level ground is a plane, which is faster and has no border; everything else a height field.
+    """
+    spec = robot.spec(gains)
+    ground = spec.worldbody.add_geom(name=GROUND, contype=1, conaffinity=0)
+    ground.friction[0] = FRICTION
+    if terrain.is_flat:
+        ground.type = mujoco.mjtGeom.mjGEOM_PLANE
+        ground.pos[2] = float(terrain.height[0, 0])
+        ground.size[:] = (0.0, 0.0, 1.0)
+    else:
+        field = to_unit_interval(terrain)
+        rows, cols = field.data.shape
+        spec.add_hfield(
+            name=GROUND, nrow=rows, ncol=cols, size=field.size, userdata=field.data.ravel().tolist()
+        )
+        ground.type = mujoco.mjtGeom.mjGEOM_HFIELD
+        ground.hfieldname = GROUND
+        ground.pos[:] = field.position
+    return spec.compile()
+
 
 CONTACT_FORCE = 1.0
 """A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
