@@ -1,4 +1,4 @@
-"""What a gait has to reach to be called clean."""
+"""The limits of a clean gait."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Limits:
     phase_consistency: float
     """Least resultant length of a foot's phase."""
     duty_asymmetry: float
-    """Greatest difference of duty factor, left to right, of a gait that is its own mirror image."""
+    """Greatest difference of duty factor between left and right, of a symmetric gait."""
     clearance: float
     """Least height of each foot at the top of its swing [m]."""
 
@@ -36,7 +36,7 @@ FIRST = Limits(
     duty_asymmetry=0.05,
     clearance=0.05,
 )
-"""Of the paper's three gaits."""
+"""Limits of the paper's three gaits."""
 
 OTHERS = Limits(
     survival=0.99,
@@ -48,13 +48,13 @@ OTHERS = Limits(
     duty_asymmetry=0.05,
     clearance=0.04,
 )
-"""Of every other gait."""
+"""Limits of every other gait."""
 
 FIRST_GAITS = ("trot", "pace", "bound")
-"""The paper's."""
+"""The paper's gaits."""
 
 LIMITS: Mapping[str, Limits] = dict.fromkeys(FIRST_GAITS, FIRST)
-"""Gaits with limits of their own class."""
+"""Gaits whose limits are not those of every other gait."""
 
 
 def limits_of(gait: str) -> Limits:

@@ -64,7 +64,7 @@ def hardest_first(judged: Sequence[Judged]) -> list[str]:
 
 
 def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
-    """Heading of a report, and how its numbers were chosen and judged."""
+    """Heading of a report, what it shows, and how its numbers were chosen and judged."""
     tuned = judged[0].tuned
     who = (
         "The settings were chosen on some logs and judged on others."

@@ -1,4 +1,4 @@
-"""Many jobs on as many processes as wanted, one run a core, and none left behind."""
+"""Runs jobs in a number of parallel processes, and leaves no process behind."""
 
 import multiprocessing
 import os
@@ -15,7 +15,7 @@ from gaitshift.lab.reproduction.plan import Job
 from gaitshift.lab.reproduction.training import FAILED, is_over, iterations_done, train
 
 LOOK_EVERY = 1.0
-"""Seconds between two looks at how far the runs are."""
+"""Seconds between two checks of the progress."""
 
 
 def train_all(
@@ -24,10 +24,10 @@ def train_all(
     processes: int,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Trains what is not over yet, each job in the folder of its name below `runs`.
+    """Trains all unfinished jobs, each in the folder of its name below `runs`.
 
-    `report` is called with the iterations done and those that were left at the start. Whatever
-    ends this ends the processes too; the same call goes on from the last checkpoints.
+    `report` is called with the iterations done and those that remained at the start. The processes
+    end with this call, however it ends; the same call resumes from the last checkpoints.
 
     Raises:
         GaitshiftError: a folder holds another run, or a process was killed.
@@ -43,7 +43,7 @@ def train_all(
         initializer=_end_with_parent,
     )
     try:
-        with _interrupts_ignored():  # the processes inherit it: Ctrl-C is for this one to answer
+        with _interrupts_ignored():  # inherited by the processes: only this one handles Ctrl-C
             waiting = {executor.submit(train, job, runs / job.name) for job in left}
         while waiting:
             ended, waiting = wait(waiting, timeout=LOOK_EVERY, return_when=FIRST_COMPLETED)
@@ -60,7 +60,7 @@ def train_all(
 
 
 def _new_iterations(job: Job, runs: Path, before: dict[str, int]) -> int:
-    """Iterations since the start of this command; all that were left where a run broke down."""
+    """Iterations since the start of this command; for a diverged run all that remained."""
     folder = runs / job.name
     if (folder / FAILED).is_file():
         return job.recipe.iterations - before[job.name]
@@ -74,15 +74,15 @@ def _raise_first(ended: set[Future[None]]) -> None:
 
 @contextmanager
 def _interrupts_ignored() -> Generator[None]:
-    kept = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, kept)
+        signal.signal(signal.SIGINT, handler)
 
 
 def _end_with_parent() -> None:
-    """Lets no process outlive the command, not even one that was killed."""
+    """Ends this process with its parent, even if the parent is killed."""
     parent = multiprocessing.parent_process()
     assert parent is not None
 

@@ -8,31 +8,31 @@ from gaitshift.learn.recipe import Recipe
 from gaitshift.sim.reward import RewardConfig
 
 LOCKOUT = 10
-"""Control steps between two changes of state in the main runs. The paper prints none; the first
-author's code for another robot has 10, and the published plateau of 25 to 27 asks for it: with
-b = 200 added at most every 20 steps no reward above 10 + 200 / 20 = 20 a step can be had."""
+"""Control steps between two changes of state in the main runs. The paper gives none; the first
+author's code for another robot has 10. The published plateau of 25 to 27 excludes 20: with b = 200
+added at most every 20 steps the reward per step is at most 10 + 200 / 20 = 20."""
 
 PAPER = "paper"
-"""Name of the setting that the others are held against."""
+"""Name of the setting with which the others are compared."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """One way to train: a recipe, and a lock-out for the machine of whichever gait."""
+    """One way to train: a recipe, and a lock-out for the machine of any gait."""
 
     name: str
-    """In the names of runs and in tables."""
+    """Name in the names of runs and in tables."""
     group: str
-    """The question that it answers, together with the paper's setting."""
+    """The question that it answers in comparison with the paper's setting."""
     label: str
-    """What is special, in few words."""
+    """Short description of the difference."""
     recipe: Recipe
-    """Everything but the machine."""
+    """Everything except the machine."""
     lockout: int = LOCKOUT
     """Least time between two changes of the machine's state [control steps]."""
 
     def machine(self, gait: str) -> RewardMachine:
-        """The gait's machine with this lock-out, and feet lifted as low as they like."""
+        """The gait's machine with this lock-out and without swing heights."""
         own = gaits.load(gait)
         edges = tuple(
             replace(edge, guard=replace(edge.guard, dwell=self.lockout), swing_height=0.0)
@@ -50,7 +50,7 @@ def _recipe(
     penalty_start: float = 1.0,
     **reward: object,
 ) -> Recipe:
-    """The paper's recipe on one core, on gains that hold the robot up, and one thing changed."""
+    """The paper's recipe on one core, with gains that can hold the robot up, and one change."""
     paper = Recipe.paper()
     weights: RewardConfig = replace(paper.env.reward, **reward)
     env = replace(paper.env, gains=gains, observed=observed, reward=weights)
@@ -86,7 +86,7 @@ ABLATIONS = (
     ),
     Setting(name="paper-gains", group="gains", label="Kp 3, Kd 0.2", recipe=_recipe(gains="paper")),
 )
-"""Each differs from `REFERENCE` in the one thing that it names."""
+"""Each differs from `REFERENCE` in one setting, given by its name."""
 
 AS_IN_THE_PAPER = {
     "bonus": "R + b",
@@ -96,4 +96,4 @@ AS_IN_THE_PAPER = {
     "penalties": "λ = 1 from the start",
     "gains": "Kp 80, Kd 2",
 }
-"""What the reference has where a group differs."""
+"""The reference's value of the setting of each group."""

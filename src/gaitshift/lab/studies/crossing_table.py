@@ -28,17 +28,17 @@ COLUMNS: dict[str, type] = {
     "shifts": float,
     "chattered": int,
 }
-"""`low` and `high` are Wilson's interval of the share that survived, `…_half` half the width of the
-interval of a mean (95 % both)."""
+"""`low` and `high` bound Wilson's interval of the share that survived; `…_half` is half the width
+of the interval of a mean (95 % both)."""
 
 PICTURE = "crossings.png"
 
 ENOUGH = 2
-"""Shifts that one stretch of noise is worth; more are chatter."""
+"""Shifts needed for one stretch of noise; more are chatter."""
 
 
 def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> Row:
-    """What came of the crossings of one way."""
+    """The row of the crossings of one strategy."""
     n, fell = len(crossings.fell), int(crossings.fell.sum())
     low, high = wilson(np.array([float(n - fell)]), np.array([float(n)]))
     cost = crossings.cost_of_transport
@@ -73,7 +73,7 @@ def mean_of(values: Float[np.ndarray, " K"]) -> tuple[float | str, float | str]:
 
 
 def page(rows: Sequence[Row], command: str) -> str:
-    """The whole page; `command` made the last of the rows."""
+    """The whole page; `command` computed the last rows."""
     head = (
         "way",
         "survived",

@@ -9,7 +9,7 @@ from gaitshift.lab.studies.transitions import Outcomes, Pair
 from gaitshift.table import Row, markdown
 
 PHASES = 10
-"""Parts that the stride is cut into."""
+"""Number of parts of the stride."""
 
 COLUMNS: dict[str, type] = {
     "old": str,
@@ -28,7 +28,7 @@ COLUMNS: dict[str, type] = {
     "worst_phase": str,
     "worst_phase_success": float,
 }
-"""Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
+"""Columns of the CSV file; `low` and `high` bound the 95 % interval of the success rate."""
 
 _INTRODUCTION = """# Gait shifts at a random phase
 
@@ -53,7 +53,7 @@ HEAD = (
 
 
 def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
-    """What came of the shifts of a pair."""
+    """The row of the shifts of a pair."""
     n, good = len(outcomes.success), int(outcomes.success.sum())
     low, high = wilson(np.array([float(good)]), np.array([float(n)]))
     settled = outcomes.settle[outcomes.success]
@@ -83,7 +83,7 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
 
 
 def page(rows: Sequence[Row], command: str) -> str:
-    """The whole page; `command` made the last of the rows."""
+    """The whole page; `command` computed the last rows."""
     parts = [_INTRODUCTION, f"Made by `{command}`. The same as an [interactive page](page.html)."]
     for ground in dict.fromkeys(row["ground"] for row in rows):
         of = [row for row in rows if row["ground"] == ground]
