@@ -1,4 +1,4 @@
-"""What shift conditions watch: one statistic a file, and its line here."""
+"""The statistics of shift conditions: one file each, and its line here."""
 
 from typing import Any
 
@@ -31,7 +31,7 @@ STATISTICS: dict[str, type[Any]] = {
     "speed": SpeedCommand,
     "oracle": Oracle,
 }
-"""Statistics by the name that graph files and command lines call them."""
+"""Statistics by their names in graph files and on the command line."""
 
 Watched = AnyStatistic | Oracle
 """What an edge of a graph may watch."""
@@ -43,10 +43,10 @@ def watch(
     sensed: Proprioception,
     rough: Bool[np.ndarray, " N"] | None = None,
 ) -> tuple[Any, Float[np.ndarray, "N M"]]:
-    """What a statistic remembers after a control step, and its numbers.
+    """The memory of a statistic after a control step, and its values.
 
     Raises:
-        GaitshiftError: an oracle, and nobody says which ground is `rough`.
+        GaitshiftError: the statistic is an oracle, and `rough` is not given.
     """
     if isinstance(statistic, Oracle):
         if rough is None:

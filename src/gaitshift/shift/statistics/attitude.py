@@ -1,4 +1,4 @@
-"""A rival statistic: how much roll and pitch vary."""
+"""A rival statistic: the variation of roll and pitch."""
 
 from dataclasses import dataclass
 
@@ -11,13 +11,13 @@ from gaitshift.shift.statistic import SearchRange, check_positive
 
 @dataclass(frozen=True, kw_only=True)
 class AttitudeVariance:
-    """Standard deviation of roll and pitch together, about their own running means [rad].
+    """Standard deviation of roll and pitch together about their running means [rad].
 
-    Means forget by e in `window`. NaN until a window has gone by.
+    NaN for the first window.
     """
 
     window: float = 1.0
-    """[s]"""
+    """Time constant of the means [s]."""
 
     unit = "rad"
     width = 1
@@ -39,7 +39,7 @@ class AttitudeVariance:
         angle = np.stack([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z))], axis=1)
         share = sensed.period / self.window
         weight = state[:, :1] + share * (1.0 - state[:, :1])
-        gain = share / weight  # a plain mean at first, then a forgetting one
+        gain = share / weight  # a plain mean at first, then an exponential one
         off = angle - state[:, 1:3]
         mean = state[:, 1:3] + gain * off
         square = (1.0 - gain) * (state[:, 3:] + gain * off * off)

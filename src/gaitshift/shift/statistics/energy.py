@@ -1,4 +1,4 @@
-"""A rival statistic: what a metre costs."""
+"""A rival statistic: the cost of transport."""
 
 from dataclasses import dataclass
 
@@ -12,14 +12,14 @@ from gaitshift.shift.statistic import SearchRange, check_positive
 
 @dataclass(frozen=True, kw_only=True)
 class CostOfTransport:
-    """Σ|τ q̇| / (m g v) over a running window; NaN until the window has gone by once."""
+    """Σ|τ q̇| / (m g v) over a running window; NaN for the first window."""
 
     window: float = 1.0
-    """Power and speed are means that forget by e in this time [s]."""
+    """Time constant of the means of power and speed [s]."""
     mass: float = ANYMAL_B.mass
-    """[kg]; of another robot its `Robot.mass`."""
+    """Mass of the robot [kg]; for another robot its `Robot.mass`."""
     least_speed: float = 0.1
-    """A slower robot counts as this fast [m/s]."""
+    """Lower bound of the speed v [m/s]."""
 
     unit = ""
     width = 1
@@ -30,7 +30,7 @@ class CostOfTransport:
         check_positive(self, "window", "mass", "least_speed")
 
     def start(self, n: int) -> Float[np.ndarray, "N 3"]:
-        """Sum of weights, mean power [W] and mean forward speed [m/s], nothing seen yet."""
+        """Sum of weights, mean power [W] and mean forward speed [m/s] before the first step."""
         return np.zeros((n, 3))
 
     def step(

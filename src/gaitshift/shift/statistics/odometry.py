@@ -1,4 +1,4 @@
-"""Leg odometry: where the base has moved to, by the feet that stand."""
+"""Leg odometry: the motion of the base from the feet that stand."""
 
 from dataclasses import dataclass
 
@@ -10,28 +10,28 @@ from gaitshift.robot.state import GRAVITY, Proprioception
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OdometryState:
-    """What odometry remembers. Its frame has z up; x and y as the robot's heading was given."""
+    """State of the odometry, in a frame with z up and the origin of yaw of the given headings."""
 
     base: Float[np.ndarray, "N 3"]
-    """Where the base origin is, from where it was at first [m]."""
+    """Position of the base origin relative to its start [m]."""
     velocity: Float[np.ndarray, "N 3"]
     """Its velocity [m/s]."""
     foot: Float[np.ndarray, "N 4 3"]
-    """Feet from the base, a step ago [m]."""
+    """Feet relative to the base, a step ago [m]."""
     contact: Bool[np.ndarray, "N 4"]
     """Contacts a step ago."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LegOdometry:
-    """Feet that touch in two steps running stand still: the base moves as they seem to move back.
+    """Base motion from feet that touch in two successive steps, which are assumed to stand still.
 
-    With no such foot the base flies on as it did, and falls. Errors add up with the distance: it is
-    good for the few strides that conditions look back on.
+    Without such a foot the base keeps its velocity and falls freely. Errors grow with the distance,
+    but are small over the few strides that conditions use.
     """
 
     smoothing: float = 0.03
-    """The velocity, which only flights use, forgets by e in this time [s]."""
+    """Time constant of the smoothed velocity, which is used only in flight [s]."""
 
     def start(self, n: int) -> OdometryState:
         """State of n robots at the origin, in the air and at rest."""
@@ -45,7 +45,7 @@ class LegOdometry:
     def step(
         self, state: OdometryState, sensed: Proprioception
     ) -> tuple[OdometryState, Float[np.ndarray, "N 4 3"]]:
-        """The base after this step, and where each foot is in the same frame [m]."""
+        """The base after this step, and the feet in the same frame [m]."""
         foot = upright(sensed)
         stands = sensed.contact & state.contact
         count = stands.sum(axis=1)[:, None]
@@ -64,14 +64,14 @@ class LegOdometry:
 
 
 def upright(sensed: Proprioception) -> Float[np.ndarray, "N 4 3"]:
-    """Feet from the base with z along the vertical, and x, y turned by the yaw [m].
+    """Feet relative to the base with z along the vertical, and x, y turned by the yaw [m].
 
-    Where there is no heading, x is the body's heading.
+    Without a heading, x is along the body's heading.
     """
     up = -sensed.gravity_b
     ux, uy, uz = (up[:, None, axis] for axis in range(3))
     px, py, pz = (sensed.foot_position_b[..., axis] for axis in range(3))
-    level = np.sqrt(np.maximum(1.0 - ux * ux, 1e-12))  # of the body's x axis in the horizontal
+    level = np.sqrt(np.maximum(1.0 - ux * ux, 1e-12))  # horizontal length of the body's x axis
     # Rows of the rotation: the heading, the horizontal to its left, and up.
     x = level * px - ux * (uy * py + uz * pz) / level
     y = (uz * py - uy * pz) / level

@@ -1,4 +1,4 @@
-"""A rival statistic: how fast feet slide that ought to stand."""
+"""A rival statistic: the sliding speed of feet in contact."""
 
 from dataclasses import dataclass
 
@@ -11,26 +11,26 @@ from gaitshift.shift.statistic import SIX_LEAKS, SearchRange, check_positive
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SlipState:
-    """What `Slip` remembers."""
+    """State of `Slip`."""
 
     position_b: Float[np.ndarray, "N 4 3"]
     """Feet a step ago [m]."""
     contact: Bool[np.ndarray, "N 4"]
     """Contacts a step ago."""
     speed: Float[np.ndarray, "N 4"]
-    """Running mean of the speed of each foot while it touches [m/s]; NaN before that."""
+    """Running mean of the speed of each foot in contact [m/s]; NaN before any contact."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slip:
-    """Speed of each foot over the ground while it touches [m/s], a running mean.
+    """Running mean of the speed of each foot in contact over the ground [m/s].
 
-    v + ω × p + ṗ in the body frame: base velocity from the robot's state estimation, the foot's own
-    from two steps in which it touched. The mean forgets by e in `window` of contact.
+    v + ω × p + ṗ in the body frame: v is the estimated base velocity, ṗ the foot's velocity from
+    two steps in contact.
     """
 
     window: float = 0.2
-    """[s of contact]"""
+    """Time constant of the mean [s of contact]."""
 
     unit = "m/s"
     width = 4
@@ -43,7 +43,7 @@ class Slip:
         check_positive(self, "window")
 
     def start(self, n: int) -> SlipState:
-        """State of n robots that have not been seen."""
+        """State of n robots before their first step."""
         return SlipState(
             position_b=np.zeros((n, 4, 3)),
             contact=np.zeros((n, 4), dtype=bool),

@@ -1,4 +1,4 @@
-"""A statistic for gait graphs: how fast the robot is told to walk."""
+"""A statistic for gait graphs: the commanded forward speed."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class SpeedCommand:
     search = None
 
     def start(self, n: int) -> None:
-        """Nothing to remember."""
+        """No memory."""
 
     def step(self, state: None, sensed: Proprioception) -> tuple[None, Float[np.ndarray, "N 1"]]:
         """The command of this step."""

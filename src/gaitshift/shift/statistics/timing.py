@@ -1,4 +1,4 @@
-"""A rival statistic: feet that come down early or late."""
+"""A rival statistic: early or late touchdowns."""
 
 from dataclasses import dataclass
 
@@ -11,22 +11,22 @@ from gaitshift.shift.statistic import SIX_LEAKS, SearchRange
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TimingState:
-    """What `ContactTiming` remembers."""
+    """State of `ContactTiming`."""
 
     contact: Bool[np.ndarray, "N 4"]
     """Contacts a step ago."""
     touchdown: Float[np.ndarray, "N 4"]
     """When each foot last came down [s]; NaN before that."""
     error: Float[np.ndarray, "N 4"]
-    """By how much its last stride was off [s]; NaN before two touchdowns."""
+    """Error of its last stride [s]; NaN before two touchdowns."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ContactTiming:
-    """By how much the last stride of each foot was shorter or longer than commanded [s].
+    """Difference between the last stride of each foot and the commanded stride [s].
 
-    A stride lasts from touchdown to touchdown; the machine's cycle is as long as the commanded
-    stride frequency says. A foot that is overdue shows it before it comes down.
+    A stride lasts from touchdown to touchdown. The error of an overdue foot grows before its
+    touchdown.
     """
 
     unit = "s"
@@ -37,7 +37,7 @@ class ContactTiming:
     )
 
     def start(self, n: int) -> TimingState:
-        """State of n robots of which no foot has come down."""
+        """State of n robots before any touchdown."""
         return TimingState(
             contact=np.ones((n, 4), dtype=bool),
             touchdown=np.full((n, 4), np.nan),

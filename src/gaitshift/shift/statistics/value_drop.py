@@ -1,4 +1,4 @@
-"""A rival statistic: how much less the policy's own critic expects than it did."""
+"""A rival statistic: the drop of the value of the policy's critic."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ class ValueDrop:
     """Slow running mean of the critic's value less the fast one; NaN for the first slow window."""
 
     fast: float = 0.5
-    """Window of the fast mean [s]: a stride, over which values swing."""
+    """Window of the fast mean [s]: a stride, over which values oscillate."""
     slow: float = 4.0
     """Window of the slow mean [s]."""
 
@@ -27,7 +27,7 @@ class ValueDrop:
         check_positive(self, "fast", "slow")
 
     def start(self, n: int) -> Float[np.ndarray, "N 3"]:
-        """Fast mean, slow mean, and the steps seen."""
+        """Fast mean, slow mean, and number of steps."""
         return np.zeros((n, 3))
 
     def step(
