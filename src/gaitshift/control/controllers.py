@@ -19,7 +19,7 @@ class ControllerMaker(Protocol):
         """`gaits` are names, or files that the controller reads; `robot` is ANYmal B by default.
 
         Raises:
-            GaitshiftError: it does not know a gait, or cannot drive this robot.
+            GaitshiftError: a gait is unknown, or the controller cannot drive this robot.
         """
         ...
 
@@ -28,7 +28,7 @@ CONTROLLERS: dict[str, ControllerMaker] = {
     "policy": Driver.load,
     "cpg": CpgController,
 }
-"""Trained policies; oscillators that learned nothing."""
+"""Makers by name: trained policies, and oscillators without learning."""
 
 
 def controller_maker(name: str) -> ControllerMaker:

@@ -1,4 +1,4 @@
-"""The gaits that a controller knows: their machines, and what they are commanded by themselves."""
+"""The gaits of a controller: their machines and nominal commands."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class Repertoire:
         """Index of a gait.
 
         Raises:
-            GaitshiftError: it is not among them.
+            GaitshiftError: the gait is unknown.
         """
         if gait not in self.gaits:
             raise GaitshiftError(known_names("gait", gait, self.gaits))

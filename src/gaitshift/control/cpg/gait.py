@@ -1,4 +1,4 @@
-"""The gaits that oscillators are coupled for."""
+"""The gaits of the oscillators."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ class CpgGait:
     """A gait of oscillators; the phases of its touchdowns are those of the machine of its name."""
 
     name: str
-    """Of the machine."""
+    """Name of the gait and its machine."""
     frequency: float
     """Strides a second [Hz]."""
     duty: float
@@ -22,7 +22,7 @@ class CpgGait:
     stance_y: float = 0.24
     """How far to the side [m]."""
     sweep: float = 1.0
-    """Feet sweep back faster than the command by this factor, where they lose as much by slip."""
+    """Factor on the speed at which feet sweep back, to make up for slip."""
 
 
 GAITS = {
@@ -34,5 +34,5 @@ GAITS = {
         CpgGait(name="walk", frequency=1.2, duty=0.75, speed=0.3, clearance=0.09),
     )
 }
-"""By name; numbers found by trying on flat ground. The feet of one side, or of one end, tip the
-body like a pendulum: only fast short steps near its middle keep it level."""
+"""Gaits by name; numbers found by trials on flat ground. A body on the two feet of one side or one
+end tips like a pendulum: only fast short steps near its middle keep it level."""
