@@ -87,6 +87,7 @@ def page(rows: Sequence[Row], command: str) -> str:
     )
     parts = [
         "# Does the shift help on rough ground?",
+        "The tables compare two gaits and the shifts between them on noise of each amplitude. "
         f"Robots cross {BEFORE:g} m of level ground, {NOISE:g} m of Perlin noise of one amplitude "
         f"and {AFTER:g} m of level ground: in one gait, in the other, with shifts by a condition, "
         "or with shifts by an oracle that knows where the noise is. Fields and starts are the same "

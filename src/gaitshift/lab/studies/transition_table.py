@@ -32,11 +32,12 @@ COLUMNS: dict[str, type] = {
 
 _INTRODUCTION = """# Gait shifts at a random phase
 
-Policy and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds
-if the robot does not fall within 5 s and, from some stride on, the contacts match the new gait in
-at least half of the steps of every stride. Settle time ends with the first such stride. Dip is the
-largest drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 %
-Wilson intervals."""
+The tables show how often a shift from each gait to each other gait succeeds on each ground. Policy
+and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds if the
+robot does not fall within 5 s and, from some stride on, the contacts match the new gait in at least
+half of the steps of every stride. Settle time ends with the first such stride. Dip is the largest
+drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 % Wilson
+intervals."""
 
 HEAD = (
     "from",
