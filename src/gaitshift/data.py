@@ -1,4 +1,4 @@
-"""Reads TOML files table by table and key by key; an error names the place and what is allowed."""
+"""Reads TOML files table by table and key by key; errors name the place and what is allowed."""
 
 import tomllib
 from collections.abc import Generator
@@ -12,7 +12,7 @@ from gaitshift.errors import GaitshiftError
 
 
 def tables_in(path: Path) -> dict[str, object]:
-    """The tables of a TOML file; `GaitshiftError`, without its path, where there are none."""
+    """The tables of a TOML file; `GaitshiftError`, without its path, where it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
@@ -42,16 +42,16 @@ def located(where: str) -> Generator[None]:
 
 
 def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
-    """Say in one line what is unknown, what may have been meant and what is known."""
+    """One line that names the unknown name, a similar known name, and all known names."""
     close = get_close_matches(name, known, n=1)
     meant = f" did you mean {close[0]!r}?" if close else ""
     return f"unknown {kind} {name!r};{meant} known {kind}s: {', '.join(known)}"
 
 
 class Table:
-    """One table of a gait file: its keys are all known, its values are asked for by type.
+    """One table of a TOML file with known keys, whose values are read by type.
 
-    Every method raises a `GaitshiftError` naming the key where the value is missing or of
+    Every method raises a `GaitshiftError` that names the key if the value is missing or of
     another type. A default makes the key optional.
     """
 
@@ -68,13 +68,13 @@ class Table:
         return key in self._values
 
     def get(self, key: str) -> object:
-        """Return the value as it stands."""
+        """Return the value, of any type."""
         if key not in self._values:
             raise GaitshiftError(f"key {key!r} is missing")
         return self._values[key]
 
     def text(self, key: str) -> str:
-        """Return a string that says something."""
+        """Return a string that is not empty."""
         value = self.get(key)
         if not isinstance(value, str) or not value.strip():
             raise _wrong(key, "a text", value)
@@ -114,7 +114,7 @@ class Table:
         return low, high
 
     def numbers(self, key: str, count: int, wanted: str) -> tuple[float, ...]:
-        """Return a list of so many numbers; `wanted` says what they are."""
+        """Return a list of `count` numbers; `wanted` describes them in errors."""
         values = self._list(key, wanted)
         if len(values) != count:
             raise _wrong(key, wanted, values)
@@ -131,7 +131,7 @@ class Table:
         return frozenset(cast(list[str], names))
 
     def table(self, key: str) -> dict[str, object]:
-        """Return a table of tables, [key.NAME] in TOML, each still to be read."""
+        """Return a table of unread tables, [key.NAME] in TOML."""
         value = self.get(key)
         if isinstance(value, dict) and value:
             return cast(dict[str, object], value)
@@ -148,7 +148,7 @@ class Table:
         return tuple((first, second) for first, second in read)
 
     def tables(self, key: str) -> list[object]:
-        """Return a list of tables, [[key]] in TOML, each still to be read."""
+        """Return a list of unread tables, [[key]] in TOML."""
         return self._list(key, f"a list of tables, [[{key}]]")
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""The errors a user can cause: one class, one clear line each."""
+"""The class of all errors that a user can cause."""
 
 
 class GaitshiftError(Exception):

@@ -1,4 +1,4 @@
-"""Tables as files: CSV read and written at once, line by line or as a stream, and Markdown."""
+"""Tables as files: CSV read and written whole, row by row or as a stream, and Markdown."""
 
 import csv
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -10,18 +10,18 @@ import numpy as np
 from gaitshift.errors import GaitshiftError
 
 Row = dict[str, Any]
-"""A line of a table by the names of its columns."""
+"""A row of a table by the names of its columns."""
 Columns = Mapping[str, Callable[[str], Any]]
-"""Names of columns, and what makes a value of a cell's text: `float`, `int`, `str`, …"""
+"""Names of columns, and functions that convert a cell's text to a value: `float`, `int`, …"""
 
 STREAMED = (".csv", ".parquet")
 """Endings of the files that `stream` reads."""
 
 BATCH, BLOCK = 65_536, 1 << 24
-"""What `stream` reads at a time: rows of a Parquet file, bytes of a CSV file."""
+"""Batch sizes of `stream`: rows of a Parquet file, bytes of a CSV file."""
 
 _LINE_END, _GROWING_LINE_END = "\n", "\r\n"
-"""Of tables that are written at once, and of those that grow (RFC 4180)."""
+"""Line ends of tables that are written whole, and of those that grow (RFC 4180)."""
 
 
 # Whole tables ------------------------------------------------------------------------------------
@@ -35,7 +35,7 @@ def read(path: Path, *, may_be_cut: bool = False) -> list[dict[str, str]]:
         may_be_cut: whether a last row with too few cells, as a kill leaves it, is left out.
 
     Raises:
-        GaitshiftError: the file cannot be read, or a row has other cells than the first line names.
+        GaitshiftError: the file cannot be read, or a row has more or fewer cells than the header.
     """
     _, rows = _read(path)
     if may_be_cut and rows and None in rows[-1].values():
@@ -47,12 +47,12 @@ def read(path: Path, *, may_be_cut: bool = False) -> list[dict[str, str]]:
 
 
 def read_typed(path: Path, columns: Columns, what: str) -> list[Row]:
-    """The rows of an earlier, perhaps unfinished, table of `what`; none where there is no file.
+    """The rows of an earlier, perhaps unfinished, table of `what`; no rows without a file.
 
-    An empty cell stays an empty text.
+    An empty cell stays an empty string.
 
     Raises:
-        GaitshiftError: the file is no such table.
+        GaitshiftError: the file is another table.
     """
     if not path.is_file():
         return []
@@ -68,7 +68,7 @@ def read_typed(path: Path, columns: Columns, what: str) -> list[Row]:
 
 
 def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = None) -> None:
-    """Writes a CSV file, whole or not at all; without `columns`, those of the first row."""
+    """Writes a CSV file atomically; without `columns`, those of the first row."""
     _write(path, rows, tuple(rows[0] if columns is None else columns), _LINE_END)
 
 
@@ -76,7 +76,7 @@ def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = Non
 
 
 def append(path: Path, row: Row) -> None:
-    """Adds a row to a CSV file, and in a new file the names of the columns above it."""
+    """Adds a row to a CSV file; a new file gets a header first."""
     new = not path.exists()
     with path.open("a", newline="") as file:
         lines = csv.DictWriter(file, row.keys(), lineterminator=_GROWING_LINE_END)
@@ -86,7 +86,7 @@ def append(path: Path, row: Row) -> None:
 
 
 def rewrite(path: Path, rows: Sequence[Row]) -> None:
-    """Writes a file that goes on growing, whole or not at all."""
+    """Writes a growing file atomically."""
     _write(path, rows, tuple(rows[0]), _GROWING_LINE_END)
 
 
@@ -114,7 +114,7 @@ def stream(
         raise GaitshiftError(f"no log file {path}")
     from_parquet, from_csv = cast(Any, parquet), cast(Any, arrow_csv)
     arrow = cast(Any, pa)
-    # a number may begin as if it were a whole one, so the type of the first rows is no guide
+    # The first rows may hold whole numbers only, so their type is not that of the column.
     types = {name: arrow.float64() for name in numbers}
     known = {*numbers, *flags}
     try:
@@ -139,13 +139,13 @@ def stream(
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table as Markdown has it, without a line end behind it."""
+    """A Markdown table, without a line end after it."""
     lines = [head, ("---",) * len(head), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
-    """Names of the columns, and rows: None for a cell that is missing, at None those beyond."""
+    """Names of the columns, and rows: missing cells are None, surplus cells have the key None."""
     try:
         with path.open(newline="") as file:
             reader = csv.DictReader(file)

@@ -1,3 +1,3 @@
-"""The command `gaitshift`: a thin shell over the package, one file a subcommand."""
+"""The command `gaitshift`: a thin layer over the package, with one file per subcommand."""
 
 from gaitshift.cli.app import main as main

@@ -27,8 +27,8 @@ COMMANDS = (
     "view",
     "bench",
 )
-"""The subcommands in the order of `--help`. A new one is a line here and a file beside this one of
-its name, with a dataclass of its name: `time-to-gait` is `TimeToGait` in `time_to_gait.py`."""
+"""The subcommands in the order of `--help`. A new one is a line here and a file of its name beside
+this one, with a dataclass of its name: `time-to-gait` is `TimeToGait` in `time_to_gait.py`."""
 
 
 @runtime_checkable
@@ -36,7 +36,7 @@ class Command(Protocol):
     """A subcommand: a dataclass whose fields are its options."""
 
     def run(self) -> None:
-        """Does it; `GaitshiftError` for bad input."""
+        """Runs the command; `GaitshiftError` for bad input."""
 
 
 INTERRUPTED = 130
@@ -46,11 +46,11 @@ INTERRUPTED = 130
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command line; ends the process with 0, 2 (bad input) or 130 (Ctrl-C).
 
-    A reader that has seen enough (`| head`) is no fault, and nothing is said of it.
+    A reader that closes the pipe (`| head`) is not an error, and causes no message.
     """
     try:
         _parse(arguments).run()
-        sys.stdout.flush()  # here, where a closed pipe can still be met
+        sys.stdout.flush()  # here, where the error of a closed pipe can be caught
     except GaitshiftError as error:
         say(f"gaitshift: {error}")
         sys.exit(2)
@@ -66,9 +66,9 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _nobody_reads() -> bool:
-    """Whether it is stdout whose reader is gone; then what is left to print goes nowhere."""
+    """Whether stdout has no reader; if so, the rest of the output is discarded."""
     look = select.poll()
-    look.register(sys.stdout.fileno(), 0)  # errors and hang-ups are told in any case
+    look.register(sys.stdout.fileno(), 0)  # errors and hang-ups are always reported
     if not look.poll(0):
         return False
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -103,7 +103,7 @@ def _subcommand(name: str) -> Any:
 
 
 def _first_part(box: str) -> str:
-    """What a box of tyro's says above its first rule, as one line."""
+    """The text of a tyro box above its first rule, as one line."""
     lines = [line.strip("│ ") for line in box.splitlines()[1:]]
     rule = next((i for i, line in enumerate(lines) if line.startswith(("─", "╰"))), len(lines))
     return f"{' '.join(line for line in lines[:rule] if line)}; see --help"

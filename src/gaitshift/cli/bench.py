@@ -1,4 +1,4 @@
-"""`gaitshift bench`: how fast the environment is, and how soon a training has its gait."""
+"""`gaitshift bench`: speed of the environment, and training time until a gait."""
 
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -57,7 +57,7 @@ class TimeToGaitOptions:
     """Discard earlier results in the folder."""
 
     def config(self) -> "TimeToGait":
-        """The measurement asked for."""
+        """The configuration of the measurement."""
         from gaitshift.lab.benchmark.time_to_gait import TimeToGait
 
         given = {
@@ -182,9 +182,9 @@ class Bench:
                 report(len(outcomes), config.trainings)
                 say(f"{outcome.gait}, seed {outcome.seed}, {outcome.learner}: {_text(outcome)}")
                 if out is not None:
-                    told = [*outcomes, *(one for one in known if not _told(one, outcomes))]
-                    table.write(out / TABLE, [row_of(one) for one in told], COLUMNS)
-                    _draw([one for one in told if is_of(config, one)], out)
+                    rows = [*outcomes, *(one for one in known if not _is_repeated(one, outcomes))]
+                    table.write(out / TABLE, [row_of(one) for one in rows], COLUMNS)
+                    _draw([one for one in rows if is_of(config, one)], out)
         found = summary(outcomes)
         if self.json:
             emit_json({"check": asdict(config.check), "gaits": found})
@@ -198,8 +198,8 @@ def _draw(outcomes: list[Outcome], out: Path) -> None:
     time_to_gait_figure(outcomes, out / PICTURE)
 
 
-def _told(known: Outcome, outcomes: list[Outcome]) -> bool:
-    """Whether there is an outcome of the same training by now."""
+def _is_repeated(known: Outcome, outcomes: list[Outcome]) -> bool:
+    """Whether the new outcomes have one of the same training."""
     return any(
         (known.gait, known.learner, known.seed, known.recipe)
         == (one.gait, one.learner, one.seed, one.recipe)
@@ -220,11 +220,11 @@ def _text(outcome: Outcome) -> str:
 def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
     rows: list[tuple[str, str]] = []
     for gait, entry in found.items():
-        for learner, told in entry["learners"].items():
-            bound = "" if told["reached"] else "> "
-            seeds = ", ".join(_seconds(seed["reached"], seed["seconds"]) for seed in told["seeds"])
-            steps = f"{bound}{told['steps'] / 1e6:.2f} M steps"
-            seconds = _seconds(told["reached"], told["seconds"])
+        for learner, median in entry["learners"].items():
+            bound = "" if median["reached"] else "> "
+            seeds = ", ".join(_seconds(one["reached"], one["seconds"]) for one in median["seeds"])
+            steps = f"{bound}{median['steps'] / 1e6:.2f} M steps"
+            seconds = _seconds(median["reached"], median["seconds"])
             rows.append((f"{gait}, {learner}", f"{seconds}, {steps} ({seeds})"))
         if entry["ratio"] is not None:
             times = ratio_text(entry["ratio"], is_lower_bound=entry["ratio_is_lower_bound"])

@@ -68,8 +68,8 @@ class Demo(RobotOptions, DemoConfig):
     """One JSON object on stdout: the summary."""
 
     def run(self) -> None:
-        """Runs, draws, and says where to look."""
-        _ = self.used  # what cannot be had is refused before any work
+        """Runs, draws, and prints the path of the page."""
+        _ = self.used  # raises an error before any work
         make = self.maker(self.controller)
         files = (PAGE, VIDEO, PICTURE, LOG, SUMMARY)
         check_folder(self.out, overwrite=self.overwrite, ours=files)
@@ -92,7 +92,7 @@ class Demo(RobotOptions, DemoConfig):
         print(f"results in {self.out}: {', '.join(written)}")
 
     def _summary(self, summaries: list[dict[str, Any]]) -> dict[str, Any]:
-        """The first robot's summary, and what became of all of them where there are several."""
+        """The first robot's summary, and those of all robots where there are several."""
         summary = {"seed": self.seed, **summaries[0]}
         if len(summaries) == 1:
             return summary

@@ -28,7 +28,7 @@ from gaitshift.lab.log import Log
 from gaitshift.sim.terrain import spec_help
 
 Judged = tuple[dict[str, Any], Log]
-"""Figures, and the log that they are of."""
+"""Figures and their log."""
 
 UNITS = {
     "speed_mean": "m/s",
@@ -43,7 +43,7 @@ UNITS = {
     "clearance": "m",
     "lateral_error_p95": "m",
 }
-"""Units of the figures that have one."""
+"""Units of the figures that have units."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,8 +83,8 @@ class Evaluate(RobotOption, EvaluationConfig):
             make, robot = controller_maker(self.controller), self.read_robot()
             walker = make([self.policy], self.episodes, robot=robot)
             self._make_folder()
-            told = {"controller": self.controller, "gait": walker.repertoire.gaits[0]}
-            figures, log = self._evaluate(partial(evaluate_controller, walker), told)
+            named = {"controller": self.controller, "gait": walker.repertoire.gaits[0]}
+            figures, log = self._evaluate(partial(evaluate_controller, walker), named)
             self._write(figures, log, walker.repertoire.machines[0])
             return
         loaded = policies.load(self.policy, self.read_robot())
@@ -93,19 +93,19 @@ class Evaluate(RobotOption, EvaluationConfig):
             self._command(loaded)
             return
         if self.trials is None:
-            told = {"policy": str(loaded.path), "gait": loaded.gait}
-            figures, log = self._evaluate(partial(evaluate, loaded), told)
+            named = {"policy": str(loaded.path), "gait": loaded.gait}
+            figures, log = self._evaluate(partial(evaluate, loaded), named)
         else:
             figures, log = self._try(loaded, self.trials)
         self._write(figures, log, loaded.machine)
 
     def _make_folder(self) -> None:
-        """Of the log: where it cannot be made, nothing is walked for it."""
+        """Creates the folder of the log, so that an error comes before the run."""
         if self.log is not None:
             self.log.parent.mkdir(parents=True, exist_ok=True)
 
     def _write(self, figures: dict[str, Any], log: Log, machine: RewardMachine) -> None:
-        """The files that are asked for."""
+        """Writes the log and the figure, where given."""
         if self.log is not None:
             log.save(self.log)
             say(f"log written to {self.log}")
@@ -116,13 +116,13 @@ class Evaluate(RobotOption, EvaluationConfig):
             say(f"diagram written to {self.plot}")
 
     def _evaluate(
-        self, walk: Callable[[EvaluationConfig, Report], Judged], told: dict[str, str]
+        self, walk: Callable[[EvaluationConfig, Report], Judged], named: dict[str, str]
     ) -> Judged:
-        config, gait = self._config(), told["gait"]
+        config, gait = self._config(), named["gait"]
         with progress(f"{gait} on {self.terrain}") as report:
             figures, log = walk(config, report)
         if self.json:
-            emit_json({**told, **asdict(config), **figures})
+            emit_json({**named, **asdict(config), **figures})
         else:
             title = f"{gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"
             emit_table(title, _figure_rows(figures))
@@ -153,8 +153,8 @@ class Evaluate(RobotOption, EvaluationConfig):
         with progress(f"commands of {loaded.gait}") as report:
             rows = follow_commands(loaded, self.seed, report)
         if self.json:
-            kept = [asdict(row) for row in rows]
-            emit_json({"policy": str(loaded.path), "gait": loaded.gait, "commands": kept})
+            followed = [asdict(row) for row in rows]
+            emit_json({"policy": str(loaded.path), "gait": loaded.gait, "commands": followed})
         else:
             emit_table(f"{loaded.gait}, tracking of commands on flat ground", _followed(rows))
 
@@ -163,7 +163,7 @@ class Evaluate(RobotOption, EvaluationConfig):
         return EvaluationConfig(**{name: getattr(self, name) for name in names})
 
     def _check_files(self) -> None:
-        """Refuses what cannot be done before any work."""
+        """Raises `GaitshiftError` for bad paths before any work."""
         for option, path in (("--log", self.log), ("--plot", self.plot)):
             if path is not None and path.is_dir():
                 raise GaitshiftError(f"{option} must be a file, got the folder {path}")

@@ -1,4 +1,4 @@
-"""`gaitshift identify`: which condition, and with which numbers, from logs."""
+"""`gaitshift identify`: finds the best condition and its numbers from logs."""
 
 import shlex
 import shutil
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 ROC, PAGE = "roc.png", "page.html"
 UNFINISHED = "unfinished"
-"""Folder, in that of the report, of what is kept until it is written."""
+"""Folder of the cache inside the report's folder, until the report is written."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,14 +108,14 @@ class Identify:
 
 
 def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
-    """Draws the pictures into `out`: a line on each, by its file."""
+    """Draws the figures into `out`; returns a caption for each file."""
     from gaitshift.lab.identification.report import hardest_first
     from gaitshift.show.plots.identification import condition_map, roc_figure
 
     pictures: dict[str, str] = {}
     for one in judged:
         if one.tuned.choice.is_free is None:
-            continue  # nothing was tried but the numbers that were given
+            continue  # no map for given numbers
         name = one.tuned.candidate.name
         condition_map(one, out / f"{name}.png")
         pictures[f"{name}.png"] = f"Mean delay of {name} over α and β"

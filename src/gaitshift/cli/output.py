@@ -1,4 +1,4 @@
-"""How commands speak: results on stdout, everything else on stderr."""
+"""Output of commands: results on stdout, everything else on stderr."""
 
 import json
 import sys
@@ -15,13 +15,13 @@ from rich.table import Table
 from gaitshift.errors import GaitshiftError
 
 Report = Callable[[int, int], None]
-"""Takes the work done and the work in all."""
+"""Takes the work done and the total."""
 
 README = "README.md"
 """Page in the folder of results."""
 
 _WHOLE = 1000
-"""Columns that hold any table."""
+"""Width for tables that are not folded [characters]."""
 
 
 def say(line: str) -> None:
@@ -35,19 +35,19 @@ def emit_json(data: Any) -> None:
 
 
 def emit_table(title: str, rows: Sequence[tuple[str, ...]]) -> None:
-    """A short table on stdout; whole where that is no terminal, else folded into its width."""
+    """A short table on stdout, folded to the width of a terminal, unfolded elsewhere."""
     table = Table(title=title, show_header=False, title_justify="left")
-    table.add_column(no_wrap=True)  # names; what does not fit is broken in the other columns
+    table.add_column(no_wrap=True)  # names; only the other columns are folded
     for _ in range(max(map(len, rows), default=1) - 1):
         table.add_column(overflow="fold")
     for row in rows:
-        table.add_row(*(escape(cell) for cell in row))  # units stand in brackets, as markup does
+        table.add_row(*(escape(cell) for cell in row))  # units are in brackets, like markup
     Console(width=None if sys.stdout.isatty() else _WHOLE).print(table)
 
 
 @contextmanager
 def progress(label: str) -> Generator[Report]:
-    """A progress bar on stderr, with the time left; silent where stderr is no terminal."""
+    """A progress bar on stderr, with the time left; nothing where stderr is not a terminal."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -63,10 +63,10 @@ def progress(label: str) -> Generator[Report]:
 def check_folder(
     folder: Path, *, overwrite: bool, ours: tuple[str, ...], left: str | None = None
 ) -> None:
-    """Refuses an output folder that has content, but for `overwrite`; makes nothing.
+    """`GaitshiftError` for an output folder with content, unless `overwrite`; creates nothing.
 
-    Even then nothing is deleted: the files in `ours` will be replaced, others stay. What a run that
-    was killed has `left` there is no content.
+    It deletes nothing either: the files in `ours` will be replaced, others stay. The entry `left`
+    by a killed run does not count as content.
     """
     if folder.exists() and not folder.is_dir():
         raise GaitshiftError(f"--out must be a folder, got the file {folder}")
@@ -80,13 +80,13 @@ def check_folder(
 
 
 def check_table_folder(path: Path, *, overwrite: bool) -> None:
-    """As `check_folder`, of the folder of a table; what lies beside a table stays."""
+    """`check_folder` for the folder of a table; other files stay."""
     if not path.is_file():
         check_folder(path.parent, overwrite=overwrite, ours=(path.name, README))
 
 
 def check_numbers(what: str, count: int, seed: int, *, least: int = 1) -> None:
-    """`GaitshiftError` unless there are so many, and the seed is one."""
+    """`GaitshiftError` unless the count is at least `least` and the seed is valid."""
     if not least <= count <= 1_000_000:
         raise GaitshiftError(f"{what} must be {least} to 1000000, got {count}")
     if seed < 0:

@@ -51,7 +51,7 @@ class Record(RobotOption):
     """One JSON object on stdout."""
 
     def run(self) -> None:
-        """Records, and tells what there is."""
+        """Records, and prints all logs."""
         if not self.policies:
             raise GaitshiftError(
                 f"policies must be some of {', '.join(policies.shipped())}, or .onnx files, "
@@ -108,10 +108,10 @@ class Record(RobotOption):
         return _row(path, log)
 
     def _found(self, asked: Sequence[tuple[str, Course]]) -> dict[Path, Row]:
-        """Rows of the logs that are there already, each as long and of as many robots as asked.
+        """Rows of the logs that exist already, of the same length and number of robots.
 
         Raises:
-            GaitshiftError: one holds something else.
+            GaitshiftError: a log has other content.
         """
         found: dict[Path, Row] = {}
         steps = RolloutConfig(seconds=self.seconds).steps

@@ -16,10 +16,10 @@ from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
 
 _TRACK, _SECONDS = "flat@5,perlin:0.1@12", 9.0
-"""What policies of a training are shown on."""
+"""Track and time on which policies of a training are shown."""
 
 _CHECKPOINTS = 4
-"""Most of them that are shown beside the policy at the end."""
+"""Largest number of checkpoints that are shown beside the final policy."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""`gaitshift reproduce`: the paper's recipe run again, and what of it holds."""
+"""`gaitshift reproduce`: trains with the paper's recipe, and compares the results."""
 
 import os
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Reproduce:
     """One JSON object on stdout: the findings and the tables."""
 
     def run(self) -> None:
-        """Trains what is missing, and writes the report."""
+        """Trains all unfinished runs, and writes the report."""
         try:
             from gaitshift.lab.reproduction.plan import Plan
             from gaitshift.lab.reproduction.results import EarlierRuns, Results

@@ -1,4 +1,4 @@
-"""Options that commands share: which robot, and whose policies."""
+"""Shared options of commands: the robot and its policies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class RobotOptions(RobotOption):
     """Policy files ending in .onnx that take the place of the shipped policies of their gaits."""
 
     def known_gaits(self) -> tuple[str, ...]:
-        """Gaits with a policy: the files', and, of ANYmal B, the shipped ones."""
+        """Gaits with a policy: those of the files and, for ANYmal B, the shipped ones."""
         shipped = policy.shipped() if self.robot_file is None else ()
         return tuple(dict.fromkeys((*shipped, *self._from_files(self.read_robot()))))
 
@@ -47,10 +47,10 @@ class RobotOptions(RobotOption):
         return {gait: given.get(gait) or policy.load(gait, robot) for gait in gaits}
 
     def maker(self, name: str) -> ControllerMaker:
-        """The maker of this name, of controllers of this robot that read the policy files.
+        """The maker of this name, for controllers of this robot with the policy files.
 
         Raises:
-            GaitshiftError: no such maker, or a file is of another robot.
+            GaitshiftError: the maker is unknown, or a file is of another robot.
         """
         make, own = controller_maker(name), self.read_robot()
         files = {gait: str(given.path) for gait, given in self._from_files(own).items()}

@@ -53,7 +53,7 @@ class Study(RobotOptions):
     """One JSON object on stdout."""
 
     def run(self) -> None:
-        """Crosses, and tells what came of it."""
+        """Runs the crossings, and prints the results."""
         try:
             from gaitshift.lab.studies.crossing import (
                 COLUMNS,

@@ -112,7 +112,7 @@ class Train(RobotOption):
 
 
 def _spell(verdict: "Row") -> str:
-    """What a verdict calls the gait, and whether it is clean."""
+    """The gait of a verdict, and whether it is clean."""
     return f"{verdict['gait']}, {'clean' if verdict['clean'] else 'not clean'}"
 
 
@@ -152,7 +152,7 @@ class _Bar:
         self._progress.stop()
 
     def judge(self, path: Path) -> "Row":
-        """A short look at the policy as it stands."""
+        """A short evaluation of the present policy."""
         self.verdict = flat_verdict(policy.load(path, self._run.robot))
         return self.verdict
 

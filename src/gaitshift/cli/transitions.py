@@ -1,4 +1,4 @@
-"""`gaitshift transitions`: every gait swapped for every other, at any instant."""
+"""`gaitshift transitions`: shifts from every gait to every other, at random phases."""
 
 import shlex
 import sys
@@ -53,7 +53,7 @@ class Transitions(RobotOptions):
     """One JSON object on stdout."""
 
     def run(self) -> None:
-        """Shifts, and tells what came of it."""
+        """Runs the shifts, and prints the results."""
         try:
             from gaitshift.lab.studies import Pair, run_pair
             from gaitshift.lab.studies.transitions import COLUMNS, page, row_of
@@ -67,7 +67,7 @@ class Transitions(RobotOptions):
         check_numbers("switches", self.switches, self.seed)
         loaded = self.load_policies(names)
         for ground in self.grounds:
-            from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # a fault is told at once
+            from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # checks all specs first
         path = self.out / TABLE
         check_table_folder(path, overwrite=self.overwrite)
         table = ResumableTable.open(

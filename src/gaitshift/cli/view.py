@@ -42,7 +42,7 @@ class View(RobotOptions):
     """Folder for recordings."""
 
     def run(self) -> None:
-        """Opens the page, and keeps it until Ctrl-C."""
+        """Serves the page until Ctrl-C."""
         try:
             from gaitshift.show.geometry import has_meshes
             from gaitshift.show.viewer import (
@@ -89,7 +89,7 @@ class View(RobotOptions):
             close(server)
 
     def _save(self, log: Log, robot: Robot) -> str:
-        """Keeps a recording as a log and as a page; older ones stay."""
+        """Saves a recording as a log and as a page; older ones stay."""
         from gaitshift.show.report import write_report  # matplotlib is slow to import
 
         self.out.mkdir(parents=True, exist_ok=True)

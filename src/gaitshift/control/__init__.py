@@ -1,4 +1,4 @@
-"""What drives robots: policies and oscillators, and who changes their gaits."""
+"""Controllers of robots: policies and oscillators, and switchers that change their gaits."""
 
 from gaitshift.control.controller import Controller as Controller
 from gaitshift.control.controller import Repertoire as Repertoire

@@ -87,7 +87,7 @@ class Controller(Protocol):
 
     @property
     def gains(self) -> str:
-        """The preset of joint gains that it counts on."""
+        """The preset of joint gains that it needs."""
         ...
 
     def act(self, sensed: Proprioception, command: Command) -> Float[np.ndarray, "N 12"]:
@@ -95,13 +95,13 @@ class Controller(Protocol):
         ...
 
     def see(self, sensed: Proprioception, command: Command) -> None:
-        """Takes in what robots sense after a step, and the command that they acted on in it."""
+        """Updates the state by proprioception after a step and the command during the step."""
         ...
 
     def switch(self, ids: Int[np.ndarray, " K"], gait: str, sensed: Proprioception) -> None:
-        """Robots `ids` take up another gait at once."""
+        """Changes the gait of robots `ids` at once."""
         ...
 
     def value(self) -> Float[np.ndarray, " N"] | None:
-        """What its critic expected from what robots acted on last; None where there is none."""
+        """Value of its critic at the observation of the last action; None without a critic."""
         ...

@@ -18,7 +18,7 @@ class ControllerMaker(Protocol):
         """`gaits` are names, or files that the controller reads; `robot` is ANYmal B by default.
 
         Raises:
-            GaitshiftError: it does not know a gait, or cannot drive this robot.
+            GaitshiftError: a gait is unknown, or the controller cannot drive this robot.
         """
         ...
 

@@ -16,18 +16,17 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Proprioception
 
 STUCK = 2.0
-"""Strides for which a machine that a shift began may stand still before it has gone round once;
-then it begins anew as at the start of an episode. Ours: a walk that is taken up from a fast gait
-may come to a stand on four feet in a state in which no episode of its training stood, and out of
-which it knows no way."""
+"""Strides without a change of state after which a new machine restarts, as at the start of an
+episode, if it has not completed a cycle since the shift. Ours: a walk that starts from a fast gait
+may stop on four feet in a state in which it never stood in training, and which it cannot leave."""
 
 
 class Driver:
-    """One policy and one machine a gait, and which of them each robot uses now.
+    """A policy and a machine for each gait, and the gait that each robot uses now.
 
-    A change of gait replaces policy and machine at once (paper III-E); the new machine starts in
-    the state that fits the present contacts best (ours, the paper is silent), and begins anew where
-    it comes to a stand before it has gone round once (`STUCK`).
+    A change of gait replaces policy and machine at once (paper III-E). The new machine starts in
+    the state that fits the present contacts best (ours, the paper does not say), and restarts if it
+    stops before its first complete cycle (`STUCK`).
     """
 
     def __init__(self, policies: Mapping[str, Policy], n: int, *, start: str) -> None:
@@ -61,9 +60,9 @@ class Driver:
 
     @classmethod
     def load(cls, gaits: Sequence[str], n: int, *, robot: Robot | None = None) -> "Driver":
-        """Drives by shipped policies of these gaits, or by policy files; begins in the first.
+        """A driver with shipped policies of these gaits, or policy files; it begins in the first.
 
-        `robot` is what they are of; None: ANYmal B.
+        `robot` is the robot of the policies; None: ANYmal B.
         """
         loaded = [policies.load(gait, robot or ANYMAL_B) for gait in dict.fromkeys(gaits)]
         return cls({policy.gait: policy for policy in loaded}, n, start=loaded[0].gait)
@@ -84,9 +83,9 @@ class Driver:
         return next(iter(self.policies.values())).info.gains
 
     def see(self, sensed: Proprioception, command: Command) -> None:
-        """Moves every robot's machine on by what its feet did in the step that ended.
+        """Updates every robot's machine by the contacts after the step that ended.
 
-        `command` is the one that the robots acted on.
+        `command` is the command during the step.
         """
         self._see_feet(sensed)
         for index, ids in self.repertoire.groups(self.gait):
@@ -102,7 +101,7 @@ class Driver:
                 self._begin(ids[is_stuck], index, policy.machine.initial)
 
     def switch(self, ids: Int[np.ndarray, " K"], gait: str, sensed: Proprioception) -> None:
-        """Robots `ids` take up another gait at once; those already in it are left alone."""
+        """Changes the gait of robots `ids` at once; robots already in it are not affected."""
         index = self.repertoire.index(gait)
         ids = ids[self.gait[ids] != index]
         self.gait[ids] = index
@@ -111,7 +110,7 @@ class Driver:
     def _begin(
         self, ids: Int[np.ndarray, " K"], index: int, state: Int[np.ndarray, " K"] | int
     ) -> None:
-        """The machines of these robots, of gait number `index`, begin in a state."""
+        """Sets the machines of these robots, of gait number `index`, to a state."""
         machine_state, steps = self.state.machine_state.copy(), self.state.steps_in_state.copy()
         machine_state[ids], steps[ids] = state, 0
         self.state = replace(self.state, machine_state=machine_state, steps_in_state=steps)
@@ -133,7 +132,7 @@ class Driver:
         return target
 
     def value(self) -> Float[np.ndarray, " N"] | None:
-        """What the policies' critics expected from what robots acted on last; None without them."""
+        """Values of the policies' critics at the last observations; None without critics."""
         value = np.full(self.n, np.nan)
         for policy, ids, observation in self._acted_on:
             if not policy.has_critic:
@@ -142,7 +141,7 @@ class Driver:
         return value
 
     def _see_feet(self, sensed: Proprioception) -> None:
-        """Feet that were never seen are taken as they stand."""
+        """Sets unknown touch heights to the present foot heights."""
         height = self.state.touch_height
         if np.isnan(height).any():
             height = np.where(np.isnan(height), sensed.foot_height, height)

@@ -1,8 +1,8 @@
 """The observation S × U as named slices (paper III-D), and its mirror image.
 
 The paper's S is (u, δ, q, q̇, z, φ, v, ω, f). `PAPER_SLICES` is exactly that; `DEFAULT_SLICES` adds
-the command and the last action, which the default reward speaks of, and the heights at which the
-feet last touched, by which a policy knows rough ground from flat.
+the command and the last action, which enter the default reward, and the heights at which the feet
+last touched, by which a policy can tell rough ground from flat.
 """
 
 from collections.abc import Callable
@@ -22,7 +22,7 @@ from gaitshift.robot.state import Batch, Proprioception
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GaitState(Batch):
-    """Where N robots are in their gait: the paper's u and δ, and what they did and met last."""
+    """Gait state of N robots: the paper's u and δ, the last action and the last touch heights."""
 
     machine_state: Int[np.ndarray, "*batch"]
     """u, the state of the gait's machine."""
@@ -33,11 +33,11 @@ class GaitState(Batch):
     touch_height: Float[np.ndarray, "*batch 4"]
     """Height of each foot above the base when it last touched, along the vertical [m].
 
-    The paper's h (III-E), by which a policy knows rough ground from flat."""
+    The paper's h (III-E), by which a policy can tell rough ground from flat."""
 
 
 class _Instant(NamedTuple):
-    """What an observation is made of, of N robots at one instant."""
+    """The parts of an observation of N robots at one instant."""
 
     state: GaitState
     sensed: Proprioception
@@ -59,11 +59,11 @@ JOINT_MIRROR = (_JOINT_ORDER, _JOINT_SIGNS)
 """Mirror image of a joint vector: legs change sides, hip abduction changes sign."""
 
 STEP_SCALE = 0.05
-"""δ is shown in units of 20 control steps and saturates at 5 units: ours, to keep inputs near 1."""
+"""δ is observed in units of 20 control steps, at most 5 units: ours, to keep inputs near 1."""
 
 
 TOUCH_SCALE = 10.0
-"""Differences of touch heights are shown in units of 10 cm and saturate at 4 units: ours."""
+"""Differences of touch heights are observed in units of 10 cm, at most 4 units: ours."""
 
 
 def _sensed(s: _Instant, name: str) -> np.ndarray:
@@ -128,7 +128,7 @@ PAPER_SLICES = (
     "base_angular_velocity_b",
     "contact",
 )
-"""(u, δ, q, q̇, z, φ, v, ω, f); φ is the direction of gravity, which knows roll and pitch only."""
+"""(u, δ, q, q̇, z, φ, v, ω, f); φ is the direction of gravity, which has only roll and pitch."""
 
 DEFAULT_SLICES = (
     *PAPER_SLICES,
@@ -147,7 +147,7 @@ class Observation:
 
     machine: RewardMachine
     stance: tuple[float, ...]
-    """The robot's default joint angles, from which joint positions are observed [rad]."""
+    """The robot's default joint angles, relative to which joint positions are observed [rad]."""
     names: tuple[str, ...] = DEFAULT_SLICES
 
     def __post_init__(self) -> None:
@@ -167,7 +167,7 @@ class Observation:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Where each named slice stands in the observation vector."""
+        """The place of each named slice in the observation vector."""
         ends = np.cumsum([part.size for part in self._parts])
         return {
             name: slice(int(end) - part.size, int(end))
@@ -196,7 +196,7 @@ class Observation:
 
     @cached_property
     def mirror(self) -> tuple[Int[np.ndarray, " D"], Float32[np.ndarray, " D"]]:
-        """Order and signs such that `signs * observation[:, order]` is what a mirror would show."""
+        """Order and signs such that `signs * observation[:, order]` is the mirror image."""
         order = [
             where.start + index
             for part, where in zip(self._parts, self.slices.values(), strict=True)

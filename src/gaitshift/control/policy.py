@@ -1,4 +1,4 @@
-"""A policy file: one ONNX network with all that is needed to run it, and checks that it fits."""
+"""A policy file: one ONNX network with all data needed to run it, checked when loaded."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +20,7 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 _SHIPPED = Path(__file__).parent / "policies"
 
 _ONLY_WHAT_IS_ASKED: Any = cast(Any, onnxruntime).RunOptions()
-_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True  # the critic rests while the actor acts
+_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True  # skips the unused critic
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class Policy:
 
     @cached_property
     def observation(self) -> Observation:
-        """The observation it wants."""
+        """Its observation."""
         return Observation(self.machine, tuple(self.info.stance), tuple(self.info.observation))
 
     @cached_property
     def walker(self) -> Walker:
-        """Its gait at work."""
+        """The walker of its gait."""
         return Walker(
             machine=self.machine,
             observation=self.observation,
@@ -63,7 +63,7 @@ class Policy:
         return "value" in {output.name for output in cast(Any, self.session).get_outputs()}
 
     def value(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, " N"]:
-        """What the critic expects from N observations on: scaled rewards to come, discounted.
+        """Values of the critic for N observations: scaled discounted future rewards.
 
         Raises:
             GaitshiftError: the file has no critic.
@@ -83,7 +83,7 @@ def shipped() -> tuple[str, ...]:
 
 
 def record_file(gait: str) -> Path:
-    """The file that says how a shipped policy was trained: preset, seed, figures."""
+    """The record of the training of a shipped policy: preset, seed, figures."""
     return _SHIPPED / f"{gait}.json"
 
 
@@ -91,8 +91,8 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
     """A shipped policy by the name of its gait, or any policy file, for this robot.
 
     Raises:
-        GaitshiftError: no such policy; not a whole ONNX file; not one of gaitshift's; of another
-            format version or of another robot; or its parts contradict each other.
+        GaitshiftError: no such policy; not a complete ONNX file; not a gaitshift policy; another
+            format version or robot; or its parts contradict each other.
     """
     path = Path(name_or_path)
     if path.suffix != ".onnx":
@@ -120,7 +120,7 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
 
 def _open(path: Path) -> onnxruntime.InferenceSession:
     options = cast(Any, onnxruntime).SessionOptions()
-    options.intra_op_num_threads = 1  # the networks are small, the cores belong to the physics
+    options.intra_op_num_threads = 1  # the networks are small, and the physics uses the cores
     options.log_severity_level = 4
     try:
         return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
@@ -131,7 +131,7 @@ def _open(path: Path) -> onnxruntime.InferenceSession:
 
 
 def _check(policy: Policy) -> None:
-    """Refuses a policy of another robot, or whose parts contradict each other."""
+    """`GaitshiftError` for a policy of another robot, or with parts that contradict each other."""
     info = policy.info
     session: Any = policy.session
     inputs, outputs = (

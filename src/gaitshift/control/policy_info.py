@@ -1,4 +1,4 @@
-"""What stands in a policy file beside its network, read with care."""
+"""The description of a policy in its file, read with checks."""
 
 import json
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from gaitshift.data import Table
 from gaitshift.errors import GaitshiftError
 
 FORMAT_VERSION = 2
-"""Raised when a file of an earlier version could be misread."""
+"""Increased when a file of an earlier version could be misread."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PolicyInfo:
-    """What stands in a policy file beside the network."""
+    """Description of a policy: all of a policy file except the network."""
 
     robot: str
     """Name of the robot it was trained for."""
     machine: dict[str, Any]
-    """The reward machine, whole (`RewardMachine.to_dict`)."""
+    """The complete reward machine (`RewardMachine.to_dict`)."""
     observation: dict[str, list[int]]
     """Start and end of each named slice of the observation."""
     action_scale: float
@@ -49,7 +49,7 @@ class PolicyInfo:
     format_version: int = FORMAT_VERSION
 
     def to_metadata(self) -> dict[str, str]:
-        """As ONNX keeps it: every value a JSON text."""
+        """As ONNX metadata: every value as JSON text."""
         return {f"gaitshift.{key}": json.dumps(value) for key, value in vars(self).items()}
 
 
@@ -57,8 +57,8 @@ def read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
     """The description in an ONNX file's metadata, each value of its type and size.
 
     Raises:
-        GaitshiftError: the file is none of gaitshift's, or of another version, or a value is
-            missing or not what it should be.
+        GaitshiftError: the file is not a gaitshift policy, has another version, or lacks a value or
+            has a wrong one.
     """
     version = metadata.get("gaitshift.format_version")
     if version is None:
@@ -90,7 +90,7 @@ def _info_of(values: dict[str, object]) -> PolicyInfo:
     """The description in plain data, each value of its type and size.
 
     Raises:
-        GaitshiftError: one that is not, by its key.
+        GaitshiftError: a value has a wrong type or size; the message names its key.
     """
     read = Table(values, keys=tuple(PolicyInfo.__dataclass_fields__))
     info = PolicyInfo(
@@ -129,8 +129,8 @@ def _ends(name: str, ends: object) -> list[int]:
     if isinstance(ends, list):
         whole = [end for end in cast("list[object]", ends) if type(end) is int]
     if len(whole) != 2 or ends != whole:
-        told = shortened(cast(object, ends))
-        raise GaitshiftError(f"'observation' must give {name!r} a start and an end, got {told}")
+        shown = shortened(cast(object, ends))
+        raise GaitshiftError(f"'observation' must give {name!r} a start and an end, got {shown}")
     return whole
 
 

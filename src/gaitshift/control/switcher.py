@@ -1,4 +1,4 @@
-"""Who changes the gaits: conditions on a graph, or a schedule."""
+"""Switchers change the gaits of robots: by the conditions of a gait graph, or on a schedule."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,21 +19,21 @@ _ROUNDING = 1e-9
 
 @runtime_checkable
 class Switcher(Protocol):
-    """Looks at what robots sense once a control step, and changes gaits by their controller."""
+    """Decides from proprioception in each control step, and changes gaits of the controller."""
 
     def step(
         self, sensed: Proprioception, controller: Controller, truth: Privileged | None = None
     ) -> Decision:
         """Decides for all robots.
 
-        `sensed` has the time and the wanted command; a speed loop may ask the controller for
-        another one. `truth` is for switchers that compare robots with an oracle.
+        `sensed` has the time and the command before the speed loop's trim. `truth` is for switchers
+        with an oracle.
         """
         ...
 
 
 class Autonomous:
-    """The paper's higher controller, over any gait graph: the robots shift by its conditions."""
+    """The paper's higher controller for any gait graph: robots shift by its conditions."""
 
     def __init__(
         self,
@@ -42,7 +42,7 @@ class Autonomous:
         *,
         rough: Callable[[Privileged], Bool[np.ndarray, " N"]] | None = None,
     ) -> None:
-        """All n robots stand in the graph's first gait, nothing counted yet.
+        """All n robots start in the graph's first gait, with counters at 0.
 
         `rough` says which robots are on rough ground, for a graph with an oracle.
         """
@@ -51,10 +51,10 @@ class Autonomous:
         self._state = graph.begin(n)
 
     def retune(self, graph: GaitGraph) -> None:
-        """Goes on with other numbers on the same edges and statistics; nothing is forgotten.
+        """Continues with other numbers on the same edges and statistics, and the same state.
 
         Raises:
-            GaitshiftError: gaits, edges or statistics are others.
+            GaitshiftError: gaits, edges or statistics differ.
         """
         before, after = (
             (g.statistics, [(e.source, e.target, e.statistic) for e in g.edges])
@@ -67,7 +67,7 @@ class Autonomous:
     def step(
         self, sensed: Proprioception, controller: Controller, truth: Privileged | None = None
     ) -> Decision:
-        """Lets the edges count; where one fires, the robot changes to the gait it leads to."""
+        """Updates the counters; a robot whose edge fires changes to the target gait."""
         if "value" in self.graph.needs and sensed.value is None:
             sensed = replace(sensed, value=controller.value())
         rough = None if self._rough is None or truth is None else self._rough(truth)
@@ -89,7 +89,7 @@ def _index(gaits: tuple[str, ...], gait: str) -> int:
 
 @dataclass(frozen=True)
 class Scheduled:
-    """Gaits changed at given times, for all robots at once: the paper's seven in a row."""
+    """Gait changes at given times, for all robots at once, as in the paper's sequence of seven."""
 
     plan: tuple[tuple[float, str], ...]
     """Times [s] and the gait that begins there, in order."""
@@ -97,7 +97,7 @@ class Scheduled:
     def step(
         self, sensed: Proprioception, controller: Controller, truth: Privileged | None = None
     ) -> Decision:
-        """Carries out what fell due in the control step that ends now."""
+        """Makes the gait changes that are due in the control step that ends now."""
         late = float(sensed.time) + _ROUNDING
         fired = np.zeros(controller.n, dtype=bool)
         for start, gait in self.plan:
@@ -108,6 +108,6 @@ class Scheduled:
 
 
 def uncounted(fired: Bool[np.ndarray, " N"]) -> Decision:
-    """The decision of a switcher that counts nothing."""
+    """The decision of a switcher without counters."""
     nothing = np.zeros(len(fired))
     return Decision(fired=fired, k=nothing, threshold=nothing)

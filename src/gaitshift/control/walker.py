@@ -1,6 +1,6 @@
-"""One gait at work: what robots in it observe, what an action means, how their machine moves on.
+"""One gait in use: observations, meaning of actions, and steps of the machine.
 
-Training (`sim.env.GaitEnv`) and running (`control.Driver`) both walk by it, so they cannot differ.
+Training (`sim.env.GaitEnv`) and running (`control.Driver`) both use it, so they cannot differ.
 """
 
 from dataclasses import dataclass
@@ -16,21 +16,21 @@ from gaitshift.robot.state import Proprioception
 
 @dataclass(frozen=True, kw_only=True)
 class Walker:
-    """N robots in one gait; what they remember comes in and goes out as a `GaitState`."""
+    """N robots in one gait; their state is passed in and returned as a `GaitState`."""
 
     machine: RewardMachine
     """The gait."""
     observation: Observation
-    """What its policy sees."""
+    """The observation of its policy."""
     action_scale: float
     """Joint target = stance + action_scale · action [rad]."""
 
     def begin(
         self, sensed: Proprioception, machine_state: Int[np.ndarray, " N"] | None = None
     ) -> GaitState:
-        """Robots that have not acted yet, every foot taken as it stands.
+        """State of robots before their first action; touch heights are the present foot heights.
 
-        `machine_state` is where their machines begin; None: in the initial state.
+        `machine_state` is the first state of their machines; None: the initial state.
         """
         n = len(sensed.contact)
         state = np.full(n, self.machine.initial) if machine_state is None else machine_state
@@ -44,13 +44,13 @@ class Walker:
     def observe(
         self, state: GaitState, sensed: Proprioception, command: Command
     ) -> Float32[np.ndarray, "N D"]:
-        """What the policy sees."""
+        """The observation of the policy."""
         return self.observation(state, sensed, command)
 
     def target(
         self, action: Float[np.ndarray, "N 12"]
     ) -> tuple[Float[np.ndarray, "N 12"], Float[np.ndarray, "N 12"]]:
-        """The action within its limits, and the joint targets that it means [rad]."""
+        """The clipped action, and its joint targets [rad]."""
         clipped = np.clip(np.asarray(action, dtype=np.float64), -ACTION_LIMIT, ACTION_LIMIT)
         return clipped, self.observation.stance_angles + self.action_scale * clipped
 
@@ -61,9 +61,9 @@ class Walker:
         sensed: Proprioception,
         command: Command,
     ) -> tuple[GaitState, Step]:
-        """State after the control step in which robots did `action` under `command`.
+        """State after the control step of `action` under `command`, and the step of the machine.
 
-        `sensed` is what they sense at its end. Also what the machine did, for the reward.
+        `sensed` is the proprioception at its end. The step of the machine is for the reward.
         """
         step = self.machine.step(
             state.machine_state,

@@ -1,4 +1,4 @@
-"""What a gait file says of a gait: states, edges, and its nominal commands."""
+"""The definition of a gait: states, edges, and nominal commands."""
 
 import re
 from dataclasses import dataclass, replace
@@ -44,9 +44,9 @@ _Own = TypeVar("_Own", bound="Definition")  # Self, but for checkers of types at
 
 @dataclass(frozen=True, kw_only=True)
 class Definition:
-    """A gait as data: <U, u0, F, δu, δr> (paper III-B) and what may be commanded.
+    """A gait as data: <U, u0, F, δu, δr> (paper III-B) and the ranges of its commands.
 
-    The laws in `check.py` hold for every instance; breaking one raises `GaitshiftError`. States
+    The laws in `laws.py` hold for every instance; breaking one raises `GaitshiftError`. States
     count from 0 in the order of `states` (U and F together), and the first is u0.
     """
 
@@ -66,11 +66,11 @@ class Definition:
     """δu and δr."""
 
     dwell: int
-    """The machine's own dwell [control steps], of every edge that names no other; 0 where no edge
-    has any."""
+    """The machine's own dwell [control steps], for every edge without its own; 0 where no edge has
+    a dwell."""
 
     ideal_phase: tuple[float, float, float, float]
-    """Touchdown of each foot in `LEGS` [fraction of the stride, 0 to below 1]: the gait's norm."""
+    """Ideal touchdown of each foot in `LEGS` [fraction of the stride, 0 to below 1]."""
 
     dwell_range: tuple[int, int]
     """Least and greatest dwell that may be commanded [control steps]: the gait's frequencies. The
@@ -117,7 +117,7 @@ class Definition:
 
     @property
     def accepting(self) -> tuple[int, ...]:
-        """F: the states in which a run ends; empty for a gait that goes on for ever."""
+        """F: the states in which a run ends; empty for a gait without an end."""
         return tuple(u for u, state in enumerate(self.states) if state.accepting)
 
     @property
@@ -127,15 +127,15 @@ class Definition:
 
     @property
     def touchdowns(self) -> tuple[int, int, int, int]:
-        """How often each foot comes down on one cycle when every stance is shown exactly."""
+        """Touchdowns of each foot in one cycle in which every stance is shown exactly."""
         return touchdowns(self.states, self.edges)
 
     def stride(self, dwell: int | None = None) -> int:
-        """Least time of one cycle at a dwell, the machine's own if None [control steps]."""
+        """Least time of one cycle at a dwell, by default the machine's own [control steps]."""
         return stride(self._shares, self.dwell if dwell is None else dwell)
 
     def dwell_for(self, stride: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-        """The dwell in `dwell_range` whose cycle comes nearest to `stride` [control steps]."""
+        """The dwell in `dwell_range` whose cycle is nearest to `stride` [control steps]."""
         low, high = self.dwell_range
         strides = self._stride_of_dwell[low : high + 1]
         return low + np.abs(np.asarray(stride)[:, None] - strides).argmin(axis=1)
@@ -151,9 +151,9 @@ class Definition:
         )
 
     def mirrored_states(self) -> tuple[int, ...] | None:
-        """State u seen in a mirror is state `result[u]` of this same machine.
+        """The mirror image of state u is state `result[u]` of this machine.
 
-        None where the mirror shows another machine, as for a gait with a leading side.
+        None where the mirror image is another machine, as for a gait with a leading side.
         """
         return mirrored_states(self.states, self.edges)
 

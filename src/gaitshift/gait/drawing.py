@@ -22,7 +22,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 _INK, _QUIET, _PALE, _PAPER = "#1f2933", "#616e7c", "#e4e7eb", "#ffffff"
 _DOWN, _UP = "#0072b2", "#c04f00"
-"""Blue and vermilion after Okabe and Ito: told apart by every kind of colour vision."""
+"""Blue and vermilion after Okabe and Ito, distinct for every kind of colour vision."""
 
 _FOOT = {"FL": (-1, 1), "FR": (1, 1), "BL": (-1, -1), "BR": (1, -1)}
 """Where a foot is drawn: to the right of the body, towards its nose."""
@@ -36,8 +36,8 @@ _INCHES = 0.62
 def draw(machine: RewardMachine, path: Path) -> None:
     """Draw the machine into a PNG, SVG or PDF file, on white.
 
-    Each state is a card with the robot seen from above, nose up, filled feet down. Each arrow
-    tells the feet down, the feet up and the dwell [control steps].
+    Each state is a card with the robot seen from above, nose up; feet on the ground are filled.
+    Each arrow names the feet down, the feet up and the dwell [control steps].
     Raises `GaitshiftError` for another file ending or a folder that is not there.
     """
     if path.suffix.lower() not in FORMATS:

@@ -1,4 +1,4 @@
-"""States, guards and transitions of a machine, and the sets of feet that they are about."""
+"""States, guards and transitions of a machine, and their sets of feet."""
 
 import math
 import re
@@ -58,8 +58,8 @@ MOST_DWELL = 1000
 class Guard:
     """The condition of an edge on the contacts (paper III-C) and on time.
 
-    The contacts are the paper's. The dwell is ours, after the lock-out of the first author's
-    earlier code: without it the feet learn to vibrate.
+    The condition on contacts is the paper's. The dwell is ours, after the lock-out of the first
+    author's earlier code: without it the policy learns to vibrate its feet.
     """
 
     down: Feet
@@ -69,7 +69,7 @@ class Guard:
     """Feet that must not touch; feet neither down nor up are free."""
 
     dwell: int = 0
-    """Least number of control steps in the source state, the present one counted; 0 and 1: any."""
+    """Least number of control steps in the source state, the present one included; 0, 1: any."""
 
     def __post_init__(self):
         check_feet(self.down | self.up)
@@ -80,17 +80,17 @@ class Guard:
         check_dwell(self.dwell)
 
     def holds_in(self, feet: Feet) -> bool:
-        """Whether the contacts suit the guard when these feet alone touch."""
+        """Whether the guard holds when exactly these feet touch."""
         return self.down <= feet and not self.up & feet
 
     @property
     def labels(self) -> tuple[int, ...]:
-        """The contact patterns that suit the guard, in the numbers of `legs.label_of`."""
+        """The contact patterns in which the guard holds, in the numbers of `legs.label_of`."""
         low, high = feet_label(self.down), feet_label(self.up)
         return tuple(n for n in range(LABEL_COUNT) if n & low == low and not n & high)
 
     def pattern_shared_with(self, other: "Guard") -> Feet | None:
-        """Feet of one contact pattern that suits both guards, None where there is none."""
+        """Feet of one contact pattern in which both guards hold, None where there is none."""
         shared = set(self.labels).intersection(other.labels)
         return feet_of_label(min(shared)) if shared else None
 
@@ -103,14 +103,14 @@ class Guard:
         )
 
     def demands(self) -> list[str]:
-        """List what the guard asks for, for people."""
+        """List the demands of the guard, for people."""
         lines = [f"{feet_text(self.down)} down"] if self.down else []
         lines += [f"{feet_text(self.up)} up"] if self.up else []
         return lines + ([f"after {self.dwell} steps"] if self.dwell > 1 else [])
 
 
 def check_dwell(dwell: int) -> None:
-    """Refuse a negative or absurd dwell, with a `GaitshiftError`."""
+    """Refuse a dwell below 0 or above `MOST_DWELL`, with a `GaitshiftError`."""
     if not 0 <= dwell <= MOST_DWELL:
         raise GaitshiftError(f"dwell must be 0 to {MOST_DWELL} control steps, got {dwell}")
 
@@ -129,7 +129,7 @@ class State:
     """Feet on the ground in the stance that the state stands for; empty for a flight."""
 
     accepting: bool = False
-    """Whether the run ends here; such a state has no way out and stands for no stance."""
+    """Whether the run ends here; such a state has no outgoing edge and no stance."""
 
     def __post_init__(self):
         if not _NAME.fullmatch(self.name):
@@ -180,7 +180,7 @@ _KEYS = ("from", "to", "down", "up", "dwell", "swing_height", "bonus")
 
 @dataclass(frozen=True, kw_only=True)
 class Transition:
-    """One line of δu, from a state and the labels that suit a guard to a state (paper III-B)."""
+    """One line of δu, from a state and the labels of a guard to a state (paper III-B)."""
 
     source: str
     """Name of the state that is left."""
@@ -195,9 +195,9 @@ class Transition:
     """δr of the edge, as a multiplier of the bonus b that all edges share (paper III-C: 200)."""
 
     swing_height: float = 0.0
-    """Height [m] over the ground that the soles of the feet that come down should have reached in
-    their swing; 0: any. It bars no edge: a lower swing is paid a smaller bonus. Ours, with the
-    3 cm of RMLL in mind: without it feet drag."""
+    """Height of the soles over the ground [m] that the feet that come down should reach in their
+    swing; 0: any. A lower swing does not block the edge, but earns a smaller bonus. Ours, after the
+    3 cm of RMLL: without it feet drag."""
 
     def __post_init__(self):
         if self.source == self.target:
@@ -219,7 +219,7 @@ class Transition:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """Return the table [[transition]] of a gait file, with nothing left to a default."""
+        """Return the table [[transition]] of a gait file, with all values explicit."""
         return {
             "from": self.source,
             "to": self.target,
@@ -236,7 +236,8 @@ class Transition:
     ) -> "Transition":
         """Read the table [[transition]], the `number`-th of its file.
 
-        Dwell [control steps] and swing height [m] are the file's own, for an edge that names none.
+        Dwell [control steps] and swing height [m] are the file's defaults, for an edge without its
+        own.
         Raises `GaitshiftError`.
         """
         with located(f"transition {number}"):
@@ -258,6 +259,6 @@ class Transition:
 
 
 def check_swing_height(height: float) -> None:
-    """Refuse a negative or absurd swing height [m], with a `GaitshiftError`."""
+    """Refuse a swing height [m] below 0 or above `MOST_SWING_HEIGHT`, with a `GaitshiftError`."""
     if not 0 <= height <= MOST_SWING_HEIGHT:
         raise GaitshiftError(f"swing_height must be 0 to {MOST_SWING_HEIGHT} m, got {height:g}")

@@ -1,14 +1,14 @@
-"""The laws that every machine keeps, checked before anything runs on it.
+"""The laws of every machine, checked before it is used.
 
-1. States have names of their own, and edges join states that exist.
-2. A state has a way out, or it is accepting and has none.
+1. Names of states are unique, and edges join states that exist.
+2. A state has an outgoing edge, or it is accepting and has none.
 3. Every state is reached from the initial one.
 4. Two guards of one source state never hold at once, so δu is a function.
-5. A guard does not hold in the stance of its source, or standing still would leave the state; and
-   one guard on the way between two states holds in the stance of the target. So a state is the
-   stance that was shown last.
+5. A guard does not hold in the stance of its source, because otherwise a robot would leave the
+   state by standing still; and one guard of the edges between two states holds in the stance of
+   the target. So a state is the stance that was shown last.
 
-Besides: the cycle of a machine, what the feet do on it, and how it looks in a mirror.
+Also the cycle of a machine, its touchdowns, and its mirror image.
 """
 
 from dataclasses import replace
@@ -31,9 +31,9 @@ def check(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
 
 
 def check_lockout(edges: tuple[Transition, ...], dwell: int, dwell_range: tuple[int, int]) -> None:
-    """Refuse dwells that a commanded one, in place of the machine's own, would take away.
+    """Refuse dwells that a commanded dwell, in place of the machine's own, cannot scale.
 
-    A machine without any lock-out, in which all are 0, is lawful. Raises `GaitshiftError`.
+    A machine without a lock-out, in which all dwells are 0, is valid. Raises `GaitshiftError`.
     """
     if dwell > 0 and dwell_range[0] == 0:
         raise GaitshiftError(
@@ -123,10 +123,10 @@ def _title(number: int, edge: Transition) -> str:
 
 
 def cycle(states: tuple[State, ...], edges: tuple[Transition, ...]) -> tuple[int, ...]:
-    """Numbers of the edges from the first state on, until a state comes again.
+    """Numbers of the edges from the first state on, until a state repeats.
 
-    Where a state has several ways out, the one that stands first in the file is the gait's; of a
-    machine that ends instead of coming back, they are the edges until its end.
+    Where a state has several outgoing edges, the first in the file is taken. For a machine that
+    ends in an accepting state, these are the edges until its end.
     """
     ways = {edge.source: number for number, edge in reversed(list(enumerate(edges)))}
     followed: list[int] = []
@@ -140,7 +140,7 @@ def cycle(states: tuple[State, ...], edges: tuple[Transition, ...]) -> tuple[int
 def touchdowns(
     states: tuple[State, ...], edges: tuple[Transition, ...]
 ) -> tuple[int, int, int, int]:
-    """How often each foot comes down on one cycle when the stances are shown exactly."""
+    """Touchdowns of each foot in one cycle in which the stances are shown exactly."""
     stance = {state.name: state.stance for state in states}
     steps = [edges[number] for number in cycle(states, edges)]
     fl, fr, bl, br = (
@@ -166,10 +166,10 @@ def stride(shares_: tuple[float, ...], dwell: int) -> int:
 def mirrored_states(
     states: tuple[State, ...], edges: tuple[Transition, ...]
 ) -> tuple[int, ...] | None:
-    """State u in the mirror is state `result[u]`; None where the mirror shows another machine.
+    """The mirror image of state u is state `result[u]`; None if the image is another machine.
 
-    Of a checked machine: every state is reached from the first and guards exclude each other, so
-    the image of the first state settles those of all others.
+    The machine must be checked: every state is reached from the first and guards exclude each
+    other, so the image of the first state determines all others.
     """
     names = [state.name for state in states]
     for image_of_first in names:

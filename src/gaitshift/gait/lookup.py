@@ -1,4 +1,4 @@
-"""A machine turned into arrays, so that N robots step by gathering and not by looping."""
+"""A machine as arrays, so that N robots step by array indexing without loops."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from gaitshift.robot.legs import LABEL_COUNT, LEGS, contact_of
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lookup:
-    """δu and δr by number: `edge` says which edge suits, the rows tell what it asks and gives.
+    """δu and δr as arrays: `edge` is the edge of a state and label, rows hold data of edges.
 
-    The rows have one entry more than there are edges: the last, at index -1 and `edges`, stands
-    for "no guard holds".
+    The rows have one entry more than there are edges: the last, at index -1 and `edges`, means
+    that no guard holds.
     """
 
     edge: Int[np.ndarray, " states_x_16"]
-    """Transition that suits state u and label l, at index 16 u + l."""
+    """Transition for state u and label l, at index 16 u + l."""
 
     target: Int[np.ndarray, " rows"]
     """State the edge leads to."""
@@ -27,20 +27,20 @@ class Lookup:
     """Dwell of the edge [control steps]."""
 
     dwell_share: Int[np.ndarray, " rows"]
-    """Dwell of the edge in parts of which the machine's own dwell has `dwell_parts`."""
+    """Numerator of the dwell of the edge over the machine's own dwell."""
 
     dwell_parts: int
-    """See `dwell_share`."""
+    """Common denominator of `dwell_share`."""
 
     least_share: Float[np.ndarray, " states"]
     """Shortest dwell of the edges out of each state over the machine's own; 0 where none is."""
 
     swing_height: Float[np.ndarray, " rows"]
-    """Height that the landing feet should have reached [m]."""
+    """Height that the landing feet should reach in their swing [m]."""
 
     landing: Bool[np.ndarray, "rows 4"]
-    """Feet that swing up to the edge: down in its guard, not in the stance of its source. None
-    where no height is asked for."""
+    """Feet whose swing ends with the edge: down in its guard, not in the stance of its source. No
+    foot where the edge has no swing height."""
 
     bonus: Float[np.ndarray, " rows"]
     """Multiplier of the shared bonus; 0 in the last row."""
@@ -52,7 +52,7 @@ class Lookup:
     """Feet down in each state's stance; none for an accepting state."""
 
     expected: Bool[np.ndarray, "states 4"]
-    """Feet down in the stance of each state or of one that follows it."""
+    """Feet down in the stance of each state or of a next state."""
 
     is_stance: Bool[np.ndarray, " 16"]
     """Whether a contact label is the stance of any state."""

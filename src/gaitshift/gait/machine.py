@@ -14,20 +14,20 @@ from gaitshift.gait.lookup import Lookup
 from gaitshift.robot.legs import LABEL_COUNT, label_of
 
 GRACE = 2
-"""Control steps by which a change may be late and still be on time: ours, contacts take as long."""
+"""Control steps by which a change may be late without loss: ours, the delay of contacts."""
 
 LATEST = 0.5
-"""A change later than that by this share of the dwell earns no bonus; ours."""
+"""A change later than `GRACE` by this share of the dwell earns no bonus; ours."""
 
 
 class Step(NamedTuple):
-    """What one step did to N machines."""
+    """Result of one step of N machines."""
 
     state: Int[np.ndarray, " N"]
-    """u', the state each machine is in now."""
+    """u', the new state of each machine."""
 
     changed: Bool[np.ndarray, " N"]
-    """Whether it came there by an edge in this step."""
+    """Whether it took an edge in this step."""
 
     edge: Int[np.ndarray, " N"]
     """Number of that edge in `edges`, the number of all edges where there was none."""
@@ -38,9 +38,9 @@ class Step(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class RewardMachine(Definition):
-    """A gait as a machine whose states are stance sets and whose edges are steps of the feet.
+    """A gait as a machine whose states are stance sets and whose edges are changes of contacts.
 
-    Where no guard holds the machine stays where it is.
+    If no guard holds, the state does not change.
     """
 
     def step(
@@ -51,16 +51,16 @@ class RewardMachine(Definition):
         *,
         dwell: int | Int[np.ndarray, " N"] | None = None,
     ) -> Step:
-        """δu and δr of N machines on the labels of this control step; nothing given is changed.
+        """δu and δr of N machines on the labels of this control step; arguments are not changed.
 
         Args:
             state: u, in which the policy acted.
             contact: whether each foot touches at the end of the step, the label L(s, a, s').
             steps_in_state: δ that the policy saw, the steps since the last change: 0 in the step
-                that follows a change, and the step now ending counts. So an edge opens when
+                after a change. The step that ends now counts, so an edge opens when
                 steps_in_state + 1 reaches its dwell, and two changes are at least a dwell apart.
-            dwell: a gait-frequency command [control steps], in place of the machine's own dwell;
-                an edge that names its own keeps its proportion to it, rounded up.
+            dwell: a stride-frequency command [control steps], in place of the machine's own dwell;
+                an edge with its own dwell keeps its proportion, rounded up.
         """
         rows = self._lookup
         suiting = rows.edge[state * LABEL_COUNT + label_of(contact)]
@@ -81,7 +81,7 @@ class RewardMachine(Definition):
     def swing_share(
         self, edge: Int[np.ndarray, " N"], swing: Float[np.ndarray, "N 4"]
     ) -> Float[np.ndarray, " N"]:
-        """How much of an edge's swing height its feet have reached, in [0, 1]: the lowest counts.
+        """Share of an edge's swing height that its lowest foot reached, in [0, 1].
 
         Args:
             edge: as `step` gives it; 1 where there was none.
@@ -95,7 +95,7 @@ class RewardMachine(Definition):
     def lifted(
         self, left: Int[np.ndarray, " N"], entered: Int[np.ndarray, " N"]
     ) -> Bool[np.ndarray, "N 4"]:
-        """Feet that stand in the stance of the state left and not in that of the state entered."""
+        """Feet that are in the stance of the old state and not in that of the new one."""
         stance = self._lookup.down
         return stance[left] & ~stance[entered]
 
@@ -111,8 +111,8 @@ class RewardMachine(Definition):
     ) -> Float[np.ndarray, " N"]:
         """Control steps until the first edge out of the state may open; 0 once it may.
 
-        Arguments are as in `step`. With the state it tells the policy what the lock-out is about:
-        the stance is to be held now, or to be changed.
+        Arguments are as in `step`. With the state it shows the policy whether the lock-out requires
+        it to hold the stance, or it may change the stance.
         """
         return np.maximum(self._least_steps(state, dwell) - steps_in_state - 1, 0.0)
 
@@ -122,13 +122,13 @@ class RewardMachine(Definition):
         steps_in_state: Int[np.ndarray, " N"],
         dwell: int | Int[np.ndarray, " N"] | None = None,
     ) -> Float[np.ndarray, " N"]:
-        """How much of its bonus a change in this step still earns, in [0, 1]. Ours.
+        """Punctuality of a change in this step, a factor on its bonus in [0, 1]. Ours.
 
         1 until `GRACE` steps after the first edge out of the state may open, 0 when it is later
-        than that by `LATEST` of the dwell, and a straight line in between; 1 where no dwell is
-        asked for, and in a machine that accepts: a task has no stride. The lock-out forbids a
-        stride above the commanded frequency; this prices one below it, and one whose halves
-        differ. Arguments are as in `step`.
+        than that by `LATEST` of the dwell, and linear in between. It is 1 without a dwell, and in a
+        machine with an accepting state, which has no stride. The lock-out prevents strides above
+        the commanded frequency; this factor penalises strides below it, and unequal half-strides.
+        Arguments are as in `step`.
         """
         if self.accepting:
             return np.ones(len(state))
@@ -145,9 +145,9 @@ class RewardMachine(Definition):
         return np.ceil(self._lookup.least_share[state] * asked - 1e-9)
 
     def enter(self, contact: Bool[np.ndarray, "N 4"]) -> Int[np.ndarray, " N"]:
-        """Return the state to start in: the stance that agrees with the contacts on most feet.
+        """Return the first state: the one whose stance agrees with the contacts on most feet.
 
-        Used at the start of an episode and after a switch of gaits, on which the paper is silent.
+        Used at the start of an episode and after a gait shift, for which the paper gives no rule.
         Ties go to the lowest state; an accepting state is never entered.
         """
         return self._lookup.fitting_state[label_of(contact)]
@@ -165,7 +165,7 @@ class RewardMachine(Definition):
     def agreement(
         self, state: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
     ) -> Float[np.ndarray, " N"]:
-        """Share of the feet that are, down or up, as the stance of the present state has them.
+        """Share of the feet whose contact agrees with the stance of the present state.
 
         1 exactly where `shows_state` holds; 0 for an accepting state, which has no stance.
         """
@@ -179,8 +179,8 @@ class RewardMachine(Definition):
 def read_toml(path: Path) -> RewardMachine:
     """Read the machine in a TOML file, checked in full.
 
-    Raises `GaitshiftError` with one line that begins with the file's path, and names the line
-    where TOML itself is broken and the table where the machine is.
+    Raises `GaitshiftError` with one line that begins with the file's path. It names the line of a
+    TOML error, or the table of an error in the machine.
     """
     with located(str(path)):
         return RewardMachine.from_dict(tables_in(path))

@@ -1,4 +1,4 @@
-"""The robot: its legs, its description, what is measured of it and what it is asked to do."""
+"""The robot: its legs, description, state and commands."""
 
 from gaitshift.robot.command import Command as Command
 from gaitshift.robot.command import HeadingLoop as HeadingLoop

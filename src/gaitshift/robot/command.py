@@ -1,4 +1,4 @@
-"""What a robot is asked to do: speed, yaw rate, stride frequency; and two loops about it."""
+"""Commands of a robot: speed, yaw rate, stride frequency; and a heading and a speed loop."""
 
 from dataclasses import dataclass
 
@@ -9,30 +9,30 @@ CONTROL_PERIOD = 0.01
 """One control step [s]: the paper's 100 Hz (IV-A)."""
 
 ACTION_LIMIT = 10.0
-"""Actions are clipped to ± this, in training as after it; ours: 3 rad of joint target, beyond
-anything a walking leg asks for."""
+"""Actions are clipped to ± this, in training and after it; ours: 3 rad of joint target, more than
+a walking leg needs."""
 
 PAPER_SPEED = 1.2
 """Commanded forward speed v_d [m/s] (paper III-C)."""
 
 MOST_SPEED = 3.0
-"""Greatest speed that may be asked for [m/s]; ours: a joint at its limit swings a leg this fast."""
+"""Greatest speed command [m/s]; ours: a joint at its speed limit swings a leg this fast."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What each of N robots is asked to do at one instant."""
+    """The commands of N robots at one instant."""
 
     forward_speed: Float[np.ndarray, " N"]
-    """Wanted base velocity along body x [m/s]."""
+    """Commanded base velocity along body x [m/s]."""
     yaw_rate: Float[np.ndarray, " N"]
-    """Wanted base angular velocity about body z [rad/s]."""
+    """Commanded base angular velocity about body z [rad/s]."""
     stride_frequency: Float[np.ndarray, " N"]
-    """Wanted cycles of the gait's machine a second [Hz]."""
+    """Commanded cycles of the gait's machine per second [Hz]."""
 
     @property
     def stride(self) -> Float[np.ndarray, " N"]:
-        """Wanted time of a cycle [control steps]."""
+        """Commanded time of a cycle [control steps]."""
         return 1.0 / (self.stride_frequency * CONTROL_PERIOD)
 
     def of(self, ids: Int[np.ndarray, " K"]) -> "Command":
@@ -59,18 +59,18 @@ class Command:
 class HeadingLoop:
     """A proportional loop from heading and lateral error to a yaw-rate command.
 
-    Ours: neither the reward nor the observation of the paper knows a heading, so without it robots
-    wander off their line.
+    Ours: the paper's reward and observation have no heading, so without the loop robots leave their
+    line.
     """
 
     heading_gain: float = 1.5
     """Yaw rate per heading error [1/s]; ours: settles within 2 s at the yaw-rate limit."""
     lateral_gain: float = 0.5
-    """Wanted heading per lateral error [rad/m]; ours."""
+    """Target heading per lateral error [rad/m]; ours."""
     heading_limit: float = 0.6
     """Largest heading towards the line [rad]; ours."""
     yaw_rate_limit: float = 0.5
-    """Largest commanded yaw rate [rad/s]; ours: what the policies are trained for."""
+    """Largest commanded yaw rate [rad/s]; ours: the range of the training."""
 
     def yaw_rate(
         self,
@@ -92,29 +92,29 @@ class HeadingLoop:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpeedState:
-    """What `SpeedLoop` remembers of N robots."""
+    """State of `SpeedLoop` for N robots."""
 
     mean: Float[np.ndarray, " N"]
     """Running mean of the forward speed [m/s]."""
     trim: Float[np.ndarray, " N"]
-    """What is added to the wanted speed [m/s]."""
+    """Correction that is added to the target speed [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedLoop:
-    """An integral loop from the forward speed to the speed that a policy is asked for.
+    """An integral loop from the forward speed to the commanded speed of a policy.
 
-    Ours: within a stride the speed of a bound swings by half a metre a second, and a reward of each
-    instant leaves the mean of a policy off by up to a tenth. Only small errors are trimmed away: a
-    robot that the ground holds up is not asked to run.
+    Ours: the speed of a bound oscillates by 0.5 m/s within a stride, and a policy trained with a
+    reward at each instant has a mean speed that is wrong by up to 0.1 m/s. Only small errors are
+    corrected: a robot that the ground slows down is not commanded to run.
     """
 
     gain: float = 0.8
     """Trim per error and second [1/s]; ours: settles within two or three seconds."""
     window: float = 0.5
-    """The mean forgets by e in this time [s]; ours: about a stride."""
+    """Time constant of the mean [s]; ours: about a stride."""
     reach: float = 0.25
-    """Errors of the mean up to this are trimmed away [m/s]."""
+    """Largest error of the mean that is corrected [m/s]."""
     limit: float = 0.15
     """Largest trim [m/s]."""
 
@@ -128,9 +128,9 @@ class SpeedLoop:
         wanted: Float[np.ndarray, " N"],
         speed: Float[np.ndarray, " N"],
     ) -> tuple[SpeedState, Float[np.ndarray, " N"]]:
-        """State after a control step, and the speed to ask for [m/s].
+        """State after a control step, and the speed to command [m/s].
 
-        `speed` is the velocity along body x, `wanted` what it should be in the mean [m/s].
+        `speed` is the velocity along body x, `wanted` the target of its mean [m/s].
         """
         mean = state.mean + CONTROL_PERIOD / self.window * (speed - state.mean)
         grown = state.trim + self.gain * CONTROL_PERIOD * (wanted - speed)

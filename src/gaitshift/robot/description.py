@@ -32,10 +32,10 @@ class Gains:
 
 @dataclass(frozen=True, kw_only=True)
 class Robot:
-    """What the rest of the package needs to know of a quadruped."""
+    """Description of a quadruped."""
 
     name: str
-    """Stands in policy files; a policy of another robot is refused."""
+    """Name in policy files; a policy of another robot is refused."""
     model_file: Path
     """The robot's MJCF, without any ground."""
     stance: tuple[float, ...]
@@ -43,9 +43,9 @@ class Robot:
     stance_height: float
     """Height of the base origin above level ground in that stance, feet just touching [m]."""
     mass: float
-    """Of all its bodies [kg]."""
+    """Mass of all its bodies [kg]."""
     foot_radius: float
-    """[m]"""
+    """Radius of the spherical feet [m]."""
     effort_limit: float
     """Largest torque of a joint [N·m]."""
     velocity_limit: float
@@ -53,7 +53,7 @@ class Robot:
     action_scale: float
     """Joint target = stance + action_scale · action [rad]."""
     gains: dict[str, Gains] = field(default_factory=dict[str, Gains])
-    """Presets by name; `default` must be there."""
+    """Presets by name; `default` is required."""
 
     def __post_init__(self) -> None:
         if len(self.stance) != 12:
@@ -66,7 +66,7 @@ class Robot:
             )
 
     def check_is(self, name: str, what: str) -> None:
-        """`GaitshiftError` unless `what`, which is of the robot of this name, is of this one."""
+        """`GaitshiftError` if `what` belongs to a robot whose name `name` is not this one's."""
         if name != self.name:
             given = "no" if name == ANYMAL_B.name else "its file as"
             raise GaitshiftError(
@@ -91,9 +91,9 @@ class Robot:
         return self.gains[preset]
 
     def spec(self, gains: Gains) -> "mujoco.MjSpec":
-        """The robot's model with these gains in its joint controllers, ready for a ground.
+        """The robot's model with these gains in its joint controllers, without a ground.
 
-        MuJoCo is asked for here alone: a robot that runs policies needs no simulator.
+        MuJoCo is imported only here: a robot that runs policies needs no simulator.
         """
         import mujoco
 

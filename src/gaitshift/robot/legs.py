@@ -1,4 +1,4 @@
-"""The one order of the legs, their pairs and their contact patterns.
+"""The order of the legs, their pairs and their contact patterns.
 
 Every array whose axis is the leg follows `LEGS`; every array whose axis is the joint follows
 `LEGS` × `JOINTS`. A contact pattern is one integer, its label: bit i is set where leg i touches.
@@ -19,7 +19,7 @@ LEG_PAIRS = tuple(combinations(range(4), 2))
 """The six unordered pairs of leg indices, over which the foot-height condition runs."""
 
 MIRRORED_LEGS = (1, 0, 3, 2)
-"""Leg i of the robot seen in a mirror is leg `MIRRORED_LEGS[i]`: left and right change places."""
+"""The mirror image of leg i is leg `MIRRORED_LEGS[i]`: left and right are exchanged."""
 
 LABEL_COUNT = 16
 """Number of contact patterns, 2^P for the paper's P = {FL, FR, BL, BR}."""
@@ -33,5 +33,5 @@ def label_of(contact: Bool[np.ndarray, "*batch 4"]) -> Int[np.ndarray, "*batch"]
 
 
 def contact_of(label: Int[np.ndarray, "*batch"]) -> Bool[np.ndarray, "*batch 4"]:
-    """The contact booleans that `label_of` turned into this label."""
+    """Contact booleans of a label: the inverse of `label_of`."""
     return (np.asarray(label)[..., None] & _BITS) != 0

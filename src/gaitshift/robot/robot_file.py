@@ -1,4 +1,4 @@
-"""A robot of one's own: its numbers from a TOML file, checked together with its model."""
+"""A user's robot: its numbers from a TOML file, checked together with its model."""
 
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -17,7 +17,7 @@ _NUMBERS = ("foot_radius", "effort_limit", "velocity_limit", "action_scale")
 _KEYS = ("name", "model", "stance", *_NUMBERS, "gains")
 
 _LEVEL = 0.05
-"""Feet of a stance may differ by this in height [m]; ours."""
+"""Largest difference of foot heights in a stance [m]; ours."""
 
 SENSORS = (
     *(f"{leg}_position" for leg in LEGS),
@@ -25,7 +25,7 @@ SENSORS = (
     *(f"{leg}_touch" for leg in LEGS),
     "body_touch",
 )
-"""Of a robot's model, in their order: framepos, framelinvel and touch of the sites of the feet, and
+"""Sensors of a robot's model, in order: framepos, framelinvel and touch of the feet's sites, and
 touch of a site around the body."""
 
 
@@ -51,7 +51,7 @@ def read_robot(path: Path) -> Robot:
             name=name,
             model_file=model_file.resolve(),
             stance=stance,
-            stance_height=np.inf,  # until the model is asked, as for the mass
+            stance_height=np.inf,  # measured from the model below, like the mass
             mass=np.inf,
             gains=gains,
             **numbers,
@@ -61,15 +61,15 @@ def read_robot(path: Path) -> Robot:
 
 
 def to_dict(robot: Robot) -> dict[str, Any]:
-    """As a run keeps it: plain data."""
+    """The robot as plain data, for the files of a run."""
     return {**asdict(robot), "model_file": str(robot.model_file)}
 
 
 def from_dict(data: dict[str, Any]) -> Robot:
-    """What `to_dict` gave.
+    """The inverse of `to_dict`.
 
     Raises:
-        GaitshiftError: its model is gone.
+        GaitshiftError: the file of its model no longer exists.
     """
     gains = {name: Gains(**values) for name, values in data["gains"].items()}
     path = Path(data["model_file"])
@@ -89,7 +89,7 @@ def _gains(preset: str, data: object) -> Gains:
 
 
 def _checked_model(robot: Robot) -> mujoco.MjModel:
-    """The robot's model compiled; one line where it is not what `World` works on."""
+    """The compiled model of the robot; `GaitshiftError` where `World` cannot use it."""
     if not robot.model_file.is_file():
         raise GaitshiftError("no such file")
     try:

@@ -1,4 +1,4 @@
-"""What is known of robots: what they can sense of themselves, and what only a simulator knows.
+"""State of robots: proprioception, and privileged state that only a simulator knows.
 
 Both records have any number of leading axes: a step of N robots is (N, …), a log of T steps is
 (T, N, …), and `log[t]` is a step. Frames: `_w` world (z up), `_b` body (base origin, x forward,
@@ -23,11 +23,11 @@ GRAVITY = 9.81
 class Batch:
     """A frozen dataclass of arrays that share their leading axes, `*batch` in their shapes.
 
-    Other fields (a time, a name) belong to all of them. Fields may be records of this kind.
+    Other fields (a time, a name) apply to all entries. Fields may be `Batch`es themselves.
     """
 
     def __getitem__(self, index: Any) -> Self:
-        """Every array at this index of its first axis: of a log, a step or some of the steps."""
+        """Every array at this index of its first axis: one or several steps of a log."""
 
         def at(trailing: int, array: np.ndarray) -> Any:
             del trailing
@@ -36,7 +36,7 @@ class Batch:
         return self._map(at, also_time=True)
 
     def robots(self, ids: Int[np.ndarray, " K"] | slice) -> Self:
-        """Some of the robots, in the order of `ids`: the last of the leading axes."""
+        """Some of the robots, in the order of `ids`; robots are the last of the leading axes."""
 
         def chosen(trailing: int, array: np.ndarray) -> np.ndarray:
             axis = array.ndim - trailing - 1
@@ -45,7 +45,7 @@ class Batch:
         return self._map(chosen)
 
     def with_robots(self, ids: Int[np.ndarray, " K"], part: Self) -> Self:
-        """The same with the robots `ids` of a step as they are in `part`."""
+        """A copy in which the robots `ids` of a step are those of `part`."""
         values = dict[str, Any]()
         for name, trailing in trailing_axes(type(self)).items():
             value = getattr(self, name)
@@ -55,7 +55,7 @@ class Batch:
         return replace(cast(Any, self), **values)
 
     def as_type(self, precision: type[np.floating[Any]]) -> Self:
-        """The same with all real numbers in this precision."""
+        """A copy with all real numbers in this precision."""
 
         def cast_to(trailing: int, array: np.ndarray) -> np.ndarray:
             del trailing
@@ -65,7 +65,7 @@ class Batch:
 
     @classmethod
     def stack(cls, steps: Sequence[Self]) -> Self:
-        """Steps put one behind the other along a new first axis."""
+        """Steps stacked along a new first axis."""
         first, values = steps[0], dict[str, Any]()
         for name, trailing in trailing_axes(cls).items():
             rows = [getattr(step, name) for step in steps]
@@ -97,7 +97,7 @@ class Moving(Batch):
         """The optional field `name`.
 
         Raises:
-            GaitshiftError: it is not given, and `by` reads it.
+            GaitshiftError: the field is None; the message names `by`, which needs it.
         """
         value = getattr(self, name)
         if value is None:
@@ -112,7 +112,7 @@ class Moving(Batch):
 
 @cache
 def trailing_axes(record: type[Any]) -> dict[str, int | None]:
-    """How many axes each field of a record has behind `*batch`; None: it has no such axes."""
+    """Number of axes of each field of a record after `*batch`; None for other fields."""
     trailing: dict[str, int | None] = {}
     for field in fields(record):
         types: tuple[Any, ...] = (field.type, *get_args(field.type))
@@ -124,42 +124,42 @@ def trailing_axes(record: type[Any]) -> dict[str, int | None]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Proprioception(Moving):
-    """What robots can know of themselves, by encoders, inertial unit, feet and clock.
+    """Measurements of robots, from encoders, inertial unit, foot contacts and clock.
 
-    Conditions and policies see this record alone. The first three fields are always there; a robot
-    that lacks one of the others leaves it out, and whoever needs it says so.
+    Conditions and policies read only this record. The first three fields are required; the others
+    are None where a robot does not measure them, and code that needs one raises an error.
     """
 
     contact: Bool[np.ndarray, "*batch 4"]
-    """Whether each foot bears on the ground."""
+    """Whether each foot is in contact with the ground."""
     foot_position_b: Float[np.ndarray, "*batch 4 3"]
-    """The lowest point of each foot from the base origin, by kinematics [m]."""
+    """The lowest point of each foot relative to the base origin, by kinematics [m]."""
     orientation: Float[np.ndarray, "*batch 4"]
     """Rotation from the body to a level frame, unit quaternion (w, x, y, z)."""
     has_heading: bool = True
-    """Whether the yaw of `orientation` follows the robot; it may have any origin and drift."""
+    """Whether the yaw of `orientation` is measured; it may have any origin and drift."""
     joint_position: Float[np.ndarray, "*batch 12"] | None = None
-    """[rad]"""
+    """Joint angles [rad]."""
     joint_velocity: Float[np.ndarray, "*batch 12"] | None = None
-    """[rad/s]"""
+    """Joint velocities [rad/s]."""
     joint_torque: Float[np.ndarray, "*batch 12"] | None = None
-    """[N·m]"""
+    """Joint torques [N·m]."""
     velocity_b: Float[np.ndarray, "*batch 3"] | None = None
     """Estimated velocity of the base origin [m/s]."""
     angular_velocity_b: Float[np.ndarray, "*batch 3"] | None = None
-    """[rad/s]"""
+    """Angular velocity of the base [rad/s]."""
     time: Float[np.ndarray, " steps"] | float = 0.0
-    """Since the start [s]."""
+    """Time since the start [s]."""
     period: float = CONTROL_PERIOD
-    """From a step to the next [s]."""
+    """Time of a step [s]."""
     forward_speed_command: Float[np.ndarray, "*batch"] | None = None
     """Commanded velocity along body x [m/s]."""
     yaw_rate_command: Float[np.ndarray, "*batch"] | None = None
     """Commanded angular velocity about body z [rad/s]."""
     stride_frequency_command: Float[np.ndarray, "*batch"] | None = None
-    """Commanded cycles of the gait a second [Hz]."""
+    """Commanded cycles of the gait per second [Hz]."""
     value: Float[np.ndarray, "*batch"] | None = None
-    """What the critic of the policy at work expects from here."""
+    """Value of the active policy's critic."""
 
     @cached_property
     def rotation(self) -> Float[np.ndarray, "*batch 3 3"]:
@@ -186,9 +186,9 @@ class Proprioception(Moving):
     def foot_height(self) -> Float[np.ndarray, "*batch 4"]:
         """Height of each foot's lowest point above the base origin, along the vertical [m].
 
-        Negative while it is below: -p·g. Yaw does not enter.
+        It is -p·g, negative below the base, and independent of yaw.
         """
-        # Written out, for one robot to give the same bits alone and in a batch.
+        # Written out, so that one robot gives the same bits alone and in a batch.
         x, y, z = (self.foot_position_b[..., axis] for axis in range(3))
         gx, gy, gz = (self.gravity_b[..., axis, None] for axis in range(3))
         return -(x * gx + y * gy + z * gz)
@@ -204,7 +204,7 @@ class Proprioception(Moving):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Privileged(Moving):
-    """What only a simulator knows: the reward, the trials and the pictures read it."""
+    """State that only a simulator knows, for the reward, the trials and figures."""
 
     base_position_w: Float[np.ndarray, "*batch 3"]
     """Base origin [m]."""
@@ -213,7 +213,7 @@ class Privileged(Moving):
     velocity_b: Float[np.ndarray, "*batch 3"]
     """True velocity of the base origin [m/s]."""
     foot_position_w: Float[np.ndarray, "*batch 4 3"]
-    """The lowest point of each foot, where it would touch level ground [m]."""
+    """The lowest point of each foot, which touches level ground first [m]."""
     foot_velocity_w: Float[np.ndarray, "*batch 4 3"]
     """Velocity of each foot's centre [m/s]."""
     foot_force: Float[np.ndarray, "*batch 4"]
@@ -221,7 +221,7 @@ class Privileged(Moving):
     clearance: Float[np.ndarray, "*batch 4"]
     """Height of each foot's lowest point above the ground under it [m]."""
     body_contact: Bool[np.ndarray, "*batch"]
-    """Whether the base touches the ground: the paper's end of an episode."""
+    """Whether the base touches the ground, which ends an episode in the paper."""
 
 
 def rotation_of(quaternion: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, "*batch 3 3"]:
@@ -244,7 +244,7 @@ def rotation_of(quaternion: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, 
 def orientation_of(
     gravity_b: Float[np.ndarray, "*batch 3"], yaw: Float[np.ndarray, "*batch"] | float = 0.0
 ) -> Float[np.ndarray, "*batch 4"]:
-    """Unit quaternions (w, x, y, z) of bodies that see gravity so and head there.
+    """Unit quaternions (w, x, y, z) of bodies with this direction of gravity and this heading.
 
     `gravity_b` is a unit vector, (0, 0, -1) when level; `yaw` [rad] is about the vertical.
     """

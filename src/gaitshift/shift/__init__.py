@@ -1,4 +1,4 @@
-"""The conditions by which a robot shifts its gait itself: numpy alone, fit to run on the robot."""
+"""The conditions by which a robot shifts its gait itself; they need only numpy on the robot."""
 
 from gaitshift.robot.state import Proprioception as Proprioception
 from gaitshift.shift.graph import Decision as Decision

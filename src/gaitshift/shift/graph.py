@@ -1,4 +1,4 @@
-"""The gait graph: gaits and the conditions on the ways between them. It alone counts k."""
+"""The gait graph: gaits as nodes, shift conditions on edges. Only the graph counts k."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -20,74 +20,74 @@ from gaitshift.shift.statistics import Watched, watch
 
 @dataclass(frozen=True, kw_only=True)
 class Edge:
-    """A way from one gait to another."""
+    """An edge from one gait to another."""
 
     source: str
     """The gait it leaves."""
     target: str
     """The gait it leads to."""
     statistic: str
-    """Name, in the graph, of what its rule watches."""
+    """Name, in the graph, of the statistic of its rule."""
     rule: Rule
-    """When it is taken."""
+    """The rule by which it fires."""
     priority: int = 0
     """Of two edges that fire in the same step the one with the higher priority is taken."""
     modulation: Modulation | None = None
-    """How α follows time or speed; None: not at all."""
+    """How α depends on time or speed; None: α is constant."""
 
     @property
     def name(self) -> str:
-        """As errors call it."""
+        """Its name in error messages."""
         return f"{self.source} -> {self.target}"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GraphState:
-    """What a graph remembers of N robots between two steps."""
+    """State of a graph for N robots between two steps."""
 
     gait: Int[np.ndarray, " N"]
-    """Index into the graph's `gaits` of the gait that each robot is in; -1: none of them."""
+    """Index into the graph's `gaits` of each robot's gait; -1: none of them."""
     k: Float[np.ndarray, "N E"]
     """The paper's counter of each edge [counts]."""
     time_in_gait: Float[np.ndarray, " N"]
-    """Since the last shift [s]."""
+    """Time since the last shift [s]."""
     memory: Mapping[str, Any]
-    """What each statistic remembers, by its name in the graph."""
+    """Memory of each statistic, by its name in the graph."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Decision:
-    """What a graph decided for N robots in one step."""
+    """Decision of a graph for N robots in one step."""
 
     fired: Bool[np.ndarray, " N"]
     """Which robots change their gait now; `GraphState.gait` has the new one."""
     k: Float[np.ndarray, " N"]
-    """The counter of the edge that is nearest to firing, before a shift sets it back [counts]."""
+    """The counter of the edge that is nearest to firing, before a shift resets it [counts]."""
     threshold: Float[np.ndarray, " N"]
-    """The β that it is held against; 0 where nothing counts."""
+    """The β of that edge [counts]; 0 where no edge leaves the gait."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GaitGraph:
-    """Gaits as nodes, conditions on the edges between them; checked when it is made.
+    """Gaits as nodes, conditions on the edges between them; checked when it is built.
 
-    The paper's Algorithm 1 (III-E) is an edge, its reverse (IV-C) the edge back. Any controller can
-    carry a graph, learned or model-based (III-F). α may change between steps (III-E): go on with
-    the same state and a replaced graph, or give an edge a `modulation`.
+    The paper's Algorithm 1 (III-E) is an edge, its reverse (IV-C) the edge back. A graph works with
+    any controller, learned or model-based (III-F). α may change between steps (III-E): continue
+    with the same state and another graph, or give an edge a `modulation`.
 
     Raises:
         GaitshiftError: no edges; an edge to its own gait; a gait that cannot be reached; two edges
-            of one gait that could fire in the same step; a statistic that is not there.
+            of one gait that could fire in the same step; an unknown statistic.
     """
 
     start: str
     """The gait at the beginning."""
     statistics: Mapping[str, Watched]
-    """What is watched, by name."""
+    """Statistics by name."""
     edges: tuple[Edge, ...]
-    """The ways."""
+    """The edges."""
     reset: bool = True
-    """Whether a robot that shifts begins anew: counters at 0, nothing remembered of the ground."""
+    """Whether a shift sets the robot's counters to 0 and resets its statistics."""
 
     def __post_init__(self) -> None:
         if not self.edges:
@@ -133,7 +133,7 @@ class GaitGraph:
         return frozenset(name for one in self.statistics.values() for name in one.needs)
 
     def begin(self, n: int) -> GraphState:
-        """State of n robots in the first gait, of which nothing has been seen."""
+        """State of n robots in the first gait before their first step."""
         return GraphState(
             gait=np.zeros(n, dtype=np.int64),
             k=np.zeros((n, len(self.edges))),
@@ -147,10 +147,10 @@ class GaitGraph:
         sensed: Proprioception,
         rough: Bool[np.ndarray, " N"] | None = None,
     ) -> tuple[GraphState, Decision]:
-        """Takes in one control step of N robots: the state after it, and who shifts now.
+        """State after one control step of N robots, and which robots shift now.
 
-        Each edge that leaves a robot's gait counts on its own; the first to fire is taken. `rough`
-        is the truth about the ground, for an oracle. Nothing given is written to.
+        Each edge that leaves a robot's gait counts independently; the first to fire is taken.
+        `rough` is the true label of the ground, for an oracle. The arguments are not changed.
         """
         memory, values = dict[str, Any](), dict[str, np.ndarray]()
         for name, one in self.statistics.items():
@@ -165,7 +165,7 @@ class GaitGraph:
             takes = free & fires[:, index]
             gait[takes] = self.gaits.index(self.edges[index].target)
             free &= ~takes
-            # the edges of the new gait start anew or, as there is one k in the paper, go on from it
+            # Edges of the new gait start at 0 or, as the paper has one k, continue from it.
             k[takes] = 0.0 if self.reset else k[takes, index, None]
         if self.reset:
             for name, one in self.statistics.items():
@@ -180,7 +180,7 @@ class GaitGraph:
         values: Mapping[str, np.ndarray],
         time: Float[np.ndarray, " N"],
     ) -> tuple[Float[np.ndarray, "N E"], Bool[np.ndarray, "N E"], Decision]:
-        """The counters of the edges that leave each robot's gait moved on, and which fire."""
+        """Updated counters of the edges that leave each robot's gait, and which edges fire."""
         n, after = len(state.gait), state.k.copy()
         k, threshold, nearest = np.zeros(n), np.zeros(n), np.full(n, -np.inf)
         fires = np.zeros(after.shape, dtype=bool)
@@ -200,11 +200,11 @@ class GaitGraph:
 
     @cached_property
     def _by_priority(self) -> tuple[int, ...]:
-        """Numbers of the edges, those of high priority first."""
+        """Indices of the edges, those of high priority first."""
         return tuple(sorted(range(len(self.edges)), key=lambda i: -self.edges[i].priority))
 
     def mermaid(self) -> str:
-        """As a Mermaid `stateDiagram-v2`: a line an edge, with its rule."""
+        """The graph as a Mermaid `stateDiagram-v2`: one line per edge, with its rule."""
         lines = ["stateDiagram-v2", "    direction LR", f"    [*] --> {self.start}"]
         for edge in self.edges:
             unit = self.statistics[edge.statistic].unit

@@ -12,7 +12,7 @@ from gaitshift.shift.rule import WHENS, Rule
 from gaitshift.shift.statistics import STATISTICS, Watched
 
 DEFAULT = "terrain"
-"""The graph that robots shift by where nothing else is said."""
+"""The default gait graph."""
 
 _FOLDER = Path(__file__).parent / "graphs"
 _RULE = ("when", "alpha", "beta", "epsilon", "leak", "hold")
@@ -27,7 +27,7 @@ def load_graph(name_or_path: str | Path = DEFAULT) -> GaitGraph:
     """A shipped graph by its name, or that of a TOML file by its path.
 
     Raises:
-        GaitshiftError: no such graph, or a fault in the file, which is named with its place.
+        GaitshiftError: no such graph, or an error in the file; the message names the place.
     """
     path = Path(name_or_path)
     if path.suffix != ".toml":
@@ -75,7 +75,7 @@ _SETTINGS = tuple(
 
 
 def _value(table: Table, key: str, default: Any) -> Any:
-    """What the table says of a key, of the type of its default."""
+    """The value of a key, of the type of its default."""
     if not table.has(key):
         return default
     if isinstance(default, str):

@@ -11,15 +11,15 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import Proprioception
 
 QUANTITIES = ("speed", "time")
-"""What α may follow: the commanded forward speed [m/s], or the time [s]."""
+"""Quantities on which α may depend: the commanded forward speed [m/s], or the time [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Modulation:
-    """A factor on α, straight between given points and constant beyond them."""
+    """A factor on α, linear between given points and constant beyond them."""
 
     of: Literal["speed", "time"]
-    """What it follows."""
+    """The quantity on which it depends."""
     points: tuple[tuple[float, float], ...]
     """Pairs of a speed [m/s] or time [s], rising, and the factor there."""
 
@@ -38,7 +38,7 @@ class Modulation:
             )
 
     def factor(self, sensed: Proprioception) -> Float[np.ndarray, " N"]:
-        """Factor on each robot's α now."""
+        """Present factor on each robot's α."""
         at, factors = zip(*self.points, strict=True)
         if self.of == "time":
             return np.full(len(sensed.contact), float(np.interp(sensed.time, at, factors)))

@@ -11,7 +11,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 
 WHENS = ("above", "below")
-"""What a rule counts: numbers above α, as on rough ground, or steps with all of them below."""
+"""What a rule counts: values above α, as on rough ground, or steps with all values below α."""
 
 _ROUNDING = 1e-9
 """Times are multiples of a control step, give or take this [s]."""
@@ -21,23 +21,23 @@ _ROUNDING = 1e-9
 class Rule:
     """k grows by ε, falls by a leak, and fires above β (paper III-E, Algorithm 1).
 
-    "above": k grows by ε for each of the statistic's numbers above α, the paper's rule. "below": it
-    grows by ε once at each step at which all of them are below α, the way back (IV-C). The paper
-    prints that one "∀ i,j" and no pseudocode; it is read as one statement about the step. Counted
-    number by number, k would climb on rough ground too, where some two feet nearly always agree.
-    A number that is NaN is neither above nor below.
+    "above": k grows by ε for each of the statistic's values above α, the paper's rule. "below": k
+    grows by ε once per step in which all values are below α, the way back (IV-C). The paper gives
+    "∀ i,j" and no pseudocode for it, which we read as one condition on the step. If each value
+    counted, k would grow on rough ground too, where two feet nearly always have similar heights.
+    A NaN value is neither above nor below.
     """
 
     when: Literal["above", "below"] = "above"
-    """What it counts."""
+    """What the rule counts."""
     alpha: float
     """α, in the unit of the statistic."""
     beta: float
-    """β [counts], fire when k exceeds it."""
+    """β [counts]: the rule fires when k exceeds it."""
     epsilon: float = 1.0
     """ε [counts], increment of k (III-E: one, or in general some small number)."""
     leak: float = 0.0
-    """What k loses in each step, not below 0 [counts]; ours: the paper's k never shrinks."""
+    """Decrease of k in each step, not below 0 [counts]; ours: the paper's k never decreases."""
     hold: float = 0.0
     """Least time in a gait before the rule fires [s]; ours."""
 
@@ -54,7 +54,7 @@ class Rule:
     def count(
         self, values: Float[np.ndarray, "N M"], factor: Float[np.ndarray, " N"] | float = 1.0
     ) -> Int[np.ndarray, " N"]:
-        """How many times ε k grows; `factor` is a factor on α, by which it is modified online."""
+        """Number of ε by which k grows; `factor` multiplies α, to modify it online."""
         alpha = np.asarray(self.alpha * factor).reshape(-1, 1)
         if self.when == "above":
             return np.count_nonzero(values > alpha, axis=1)
@@ -72,7 +72,7 @@ class Rule:
     def fires(
         self, k: Float[np.ndarray, " N"], time_in_gait: Float[np.ndarray, " N"]
     ) -> Bool[np.ndarray, " N"]:
-        """Whether each robot is to shift: k is above β, and it is in its gait [s] long enough."""
+        """Whether each robot shifts: k is above β, and its time in the gait [s] is long enough."""
         return (k > self.beta) & (time_in_gait > self.hold - _ROUNDING)
 
     def delay(self, counts: float, period: float = CONTROL_PERIOD) -> float:
@@ -84,5 +84,5 @@ class Rule:
         return math.inf if rise <= 0.0 else period * (math.floor(self.beta / rise) + 1)
 
     def soonest(self, width: int, period: float = CONTROL_PERIOD) -> float:
-        """What β is in time [s]: `delay` where all of a statistic's `width` values count."""
+        """Shortest time to exceed β [s]: `delay` where all `width` values of a statistic count."""
         return self.delay(width if self.when == "above" else 1, period)

@@ -1,4 +1,4 @@
-"""What conditions watch: a few numbers a step and robot, which grow with the ground's roughness."""
+"""The statistic of a condition: a few values per step and robot that grow with roughness."""
 
 import math
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -13,10 +13,10 @@ from gaitshift.robot.state import Proprioception
 S = TypeVar("S")
 
 LEAKS = (0.0, 0.02, 0.1, 0.3, 0.6)
-"""Leaks that `identify` tries [counts a step]; ours."""
+"""Leaks that `identify` tries [counts per step]; ours."""
 
 SIX_LEAKS = tuple(6 * leak for leak in LEAKS)
-"""The same for the six pairs of feet, which count one by one."""
+"""The same for six pairs of feet, each of which counts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,28 +26,28 @@ class SearchRange:
     low: float
     """Smallest α, in the statistic's unit."""
     high: float
-    """Largest α; those between them lie evenly on a logarithmic scale."""
+    """Largest α; the values between are evenly spaced on a logarithmic scale."""
     low_back: float | None = None
-    """Smallest α on the way back, where a quiet gait shows less; None: `low`."""
+    """Smallest α on the way back, where a quiet gait has lower values; None: `low`."""
     count: int = 100
-    """How many α."""
+    """Number of α."""
     leaks: tuple[float, ...] = LEAKS
     """Leaks [counts a step]."""
     note: str = ""
-    """What the statistic stands for, in a few words."""
+    """Short description of the statistic."""
 
 
 @runtime_checkable
 class Statistic(Protocol[S]):
-    """Turns what robots sense into M numbers each; what it remembers comes in and goes out.
+    """Computes M values per robot from proprioception; its memory is passed in and returned.
 
-    A number that is not known yet is NaN. Robots do not know of each other: a batch of them is the
-    same as each alone, to the bit.
+    A value that is not known yet is NaN. Robots are independent: a batch gives the same bits as
+    each robot alone.
     """
 
     @property
     def unit(self) -> str:
-        """Of its numbers, and so of α: `m`, `rad`, or empty."""
+        """Unit of its values and of α: `m`, `rad`, or empty."""
         ...
 
     @property
@@ -62,15 +62,15 @@ class Statistic(Protocol[S]):
 
     @property
     def search(self) -> SearchRange | None:
-        """What `identify` tries; None where it says nothing of the ground."""
+        """The α and leaks that `identify` tries; None where it is independent of the ground."""
         ...
 
     def start(self, n: int) -> S:
-        """What it remembers of n robots that have not been seen yet."""
+        """Its memory of n robots before their first step."""
         ...
 
     def step(self, state: S, sensed: Proprioception) -> tuple[S, Float[np.ndarray, "N M"]]:
-        """Takes in one control step; nothing given is written to."""
+        """Memory and values after one control step; the arguments are not changed."""
         ...
 
 
@@ -84,31 +84,31 @@ def check_positive(statistic: object, *names: str) -> None:
 
 @runtime_checkable
 class Starting(Protocol):
-    """What has a state of robots that were not seen yet."""
+    """Anything with an initial state of robots."""
 
     def start(self, n: int) -> Any:
-        """That state, of n robots."""
+        """The state of n robots before their first step."""
         ...
 
 
 AnyStatistic = Statistic[Any]
-"""Where several kinds of statistic are handled alike."""
+"""A statistic of any kind."""
 
 
 def begun_anew(statistic: Starting, state: Any, who: Bool[np.ndarray, " N"]) -> Any:
-    """What a statistic remembers, with nothing of the robots `who`: they were not seen yet."""
+    """The memory of a statistic in which the robots `who` are reset."""
     return _chosen(who, statistic.start(len(who)), state) if who.any() else state
 
 
-def _chosen(who: Bool[np.ndarray, " N"], ours: Any, others: Any) -> Any:
-    """Rows of `ours` where `who`, of `others` elsewhere, in all arrays of two states."""
+def _chosen(who: Bool[np.ndarray, " N"], fresh: Any, others: Any) -> Any:
+    """Rows of `fresh` where `who`, of `others` elsewhere, in all arrays of two states."""
     state: Any = others
     if is_dataclass(others):
         names = [f.name for f in fields(others)]
-        rows = {name: _chosen(who, getattr(ours, name), getattr(others, name)) for name in names}
+        rows = {name: _chosen(who, getattr(fresh, name), getattr(others, name)) for name in names}
         return replace(cast(Any, others), **rows)
-    if not isinstance(ours, np.ndarray):
+    if not isinstance(fresh, np.ndarray):
         return state
     chosen: Any = np.array(state)
-    chosen[who] = ours[who]
+    chosen[who] = fresh[who]
     return chosen

@@ -1,4 +1,4 @@
-"""The paper's two rules as a graph of two edges: to the gait for rough ground, and back."""
+"""The paper's two rules as a gait graph with two edges: to the gait for rough ground, and back."""
 
 from dataclasses import replace
 from typing import Any
@@ -10,7 +10,7 @@ from gaitshift.shift.rule import Rule
 from gaitshift.shift.statistics import Watched
 
 NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "leak_back", "epsilon", "hold")
-"""Numbers that `tuned` changes: of the way there, of the way back, and the last two of both."""
+"""Numbers that `tuned` changes: three of the way there, three of the way back, two of both."""
 
 
 def there_and_back(
@@ -27,15 +27,15 @@ def there_and_back(
     """Algorithm 1 (III-E) from the gait `flat` to the gait `rough`, and its reverse (IV-C).
 
     Args:
-        statistic: what is watched on the way there.
-        there: ends the gait for flat ground.
-        back: ends the gait for rough ground; the paper's counts what is below α'.
-        statistic_back: what is watched on the way back; None: the same, as in the paper. Ours: what
-            tells soonest that ground is rough need not tell soonest that it is no longer.
+        statistic: the statistic on the way there.
+        there: rule that ends the gait for flat ground.
+        back: rule that ends the gait for rough ground; the paper's counts values below α'.
+        statistic_back: the statistic on the way back; None: the same, as in the paper. Ours: the
+            best statistic for the start of rough ground need not be the best for its end.
         flat: the gait for flat ground, and at the start.
         rough: the gait for rough ground.
-        reset: whether a robot that shifts begins anew.
-        modulation: how α and α' follow time or speed.
+        reset: whether a shift resets the robot's counters and statistics.
+        modulation: how α and α' depend on time or speed.
 
     Raises:
         GaitshiftError: both gaits are the same.
@@ -62,7 +62,7 @@ def ways(graph: GaitGraph) -> tuple[Edge, Edge]:
     """The edge there and the edge back of such a graph.
 
     Raises:
-        GaitshiftError: the graph is another one.
+        GaitshiftError: the graph does not have this form.
     """
     if len(graph.edges) == 2 and len(graph.gaits) == 2:
         there, back = sorted(graph.edges, key=lambda edge: edge.source != graph.start)
@@ -95,8 +95,8 @@ def tuned(graph: GaitGraph, **numbers: float | None) -> GaitGraph:
     """The graph with some of its `NUMBERS` changed; None leaves one as it is.
 
     Raises:
-        GaitshiftError: another name, a number that a rule refuses, or a graph that is not there and
-            back.
+        GaitshiftError: a name is unknown, a number is out of range, or the graph does not have two
+            edges there and back.
     """
     given: dict[str, Any] = {name: value for name, value in numbers.items() if value is not None}
     unknown = [name for name in given if name not in NUMBERS]
@@ -118,7 +118,7 @@ def tuned(graph: GaitGraph, **numbers: float | None) -> GaitGraph:
 
 
 def numbers_of(graph: GaitGraph) -> dict[str, float]:
-    """The numbers that `tuned` changes, as they are."""
+    """The present values of the numbers that `tuned` changes."""
     there, back = (edge.rule for edge in ways(graph))
     own = {name: getattr(there, name) for name in ("alpha", "beta", "leak", "epsilon", "hold")}
     return own | {f"{name}_back": getattr(back, name) for name in ("alpha", "beta", "leak")}

@@ -1,6 +1,6 @@
-"""A controller that learned nothing: coupled oscillators, foot paths and inverse kinematics.
+"""A controller without learning: coupled oscillators, foot paths and inverse kinematics.
 
-It walks by the same `act` and `see` as trained policies, and shifts by the same conditions.
+It has the same `act` and `see` as trained policies, and shifts by the same conditions.
 """
 
 from gaitshift.control.cpg.controller import CpgController as CpgController

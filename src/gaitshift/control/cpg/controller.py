@@ -1,6 +1,6 @@
-"""Oscillators to joint targets: foot paths that follow the command, feet placed for balance.
+"""From oscillators to joint targets: foot paths follow the command, feet are placed for balance.
 
-It is a `Controller` as `Driver` is, so that rollouts, conditions and switchers take either.
+It is a `Controller` like `Driver`, so that rollouts, conditions and switchers work with both.
 """
 
 from collections.abc import Sequence
@@ -21,26 +21,26 @@ from gaitshift.robot.state import GRAVITY, Proprioception
 
 @dataclass(frozen=True, kw_only=True)
 class CpgConfig:
-    """What is not of a gait."""
+    """Settings common to all gaits."""
 
     height: float = 0.46
-    """Of the base origin above the feet [m]."""
+    """Height of the base origin above the feet [m]."""
     placement: float = 0.12
-    """Feet are put down further out by this times the speed that is too much [s] (Raibert 1986)."""
+    """Foot placement offset per error of the base velocity [s] (Raibert 1986)."""
     reach_time: float = 0.05
-    """A swinging foot takes this long to get there [s]."""
+    """Time in which a swinging foot moves to that offset [s]."""
     levelling: float = 0.3
-    """Share of roll and pitch that standing legs push against."""
+    """Share of roll and pitch that standing legs correct."""
     mass: float = ANYMAL_B.mass
-    """Of the robot [kg]; standing legs are given the torques that bear it."""
+    """Mass of the robot [kg]; standing legs get the torques that support it."""
     loading: float = 0.15
-    """Share of a stance over which a leg takes its load on, and at its end off."""
+    """Share of a stance over which the load of a leg grows, and over which it falls at the end."""
     smoothing: float = 0.1
-    """The measured velocity forgets by e in this time [s]."""
+    """Time constant of the filter of the measured velocity [s]."""
 
 
 class CpgController:
-    """N robots on foot paths, each in the gait of the moment: a change is a new coupling."""
+    """N robots on foot paths, each in its present gait: a gait change is a new coupling."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class CpgController:
         """All n robots begin in the gait `start`; None: in the first of the gaits.
 
         Raises:
-            GaitshiftError: oscillators have no such gait, or the robot is not ANYmal B.
+            GaitshiftError: there are no oscillators for the gait, or the robot is not ANYmal B.
         """
         if robot is not None and robot != ANYMAL_B:
             raise GaitshiftError(f"the oscillators know ANYmal B alone, got '{robot.name}'")
@@ -68,8 +68,8 @@ class CpgController:
         self.network = HopfNetwork() if network is None else network
         self.n = n
         self.machine_state: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
-        """For logs: oscillators have no machine, and go through its states at an even pace, from
-        one touchdown of the first leg that is asked of them to the next."""
+        """For logs only: oscillators have no machine. Their phase runs through its states at a
+        constant rate, from one nominal touchdown of the first leg to the next."""
         names = tuple(dict.fromkeys(gaits))
         self._of = [GAITS[name] for name in names]
         machines = tuple(load(name) for name in names)
@@ -95,7 +95,7 @@ class CpgController:
 
     @property
     def robot(self) -> Robot:
-        """The robot whose legs it knows."""
+        """The robot that it drives."""
         return ANYMAL_B
 
     @property
@@ -104,7 +104,7 @@ class CpgController:
         return "default"
 
     def see(self, sensed: Proprioception, command: Command) -> None:
-        """Takes in what robots sense after a step under `command`."""
+        """Updates the state by proprioception after a step under `command`."""
         share = CONTROL_PERIOD / self.config.smoothing
         seen = sensed.need("velocity_b", "oscillators")[:, :2]
         self._velocity = self._velocity + share * (seen - self._velocity)
@@ -128,10 +128,10 @@ class CpgController:
         return angles + torque / gains.kp
 
     def value(self) -> None:
-        """Oscillators expect nothing."""
+        """Oscillators have no critic."""
 
     def _loads(self, phase: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
-        """What each leg is to bear now [N]: the legs that stand share the weight."""
+        """Present load of each leg [N]: the standing legs share the weight."""
         duty, loading = self._duty[self.gait][:, None], self.config.loading
         part = phase / duty
         share = np.clip(np.minimum(part, 1.0 - part) / loading, 0.0, 1.0)
@@ -141,12 +141,12 @@ class CpgController:
     def _feet(
         self, phase: Float[np.ndarray, "N 4"], sensed: Proprioception, command: Command
     ) -> Float[np.ndarray, "N 4 3"]:
-        """Where the middle of each foot is to be, body frame [m]."""
+        """Target of the centre of each foot, body frame [m]."""
         config = self.config
         duty = self._duty[self.gait][:, None]
         stance_time = duty / command.stride_frequency[:, None]
         home = self._home[self.gait]
-        # What the ground does under the feet while they stand: the command, seen from the base.
+        # Commanded velocity of the body at each foot, with which standing feet sweep back.
         velocity = np.stack(
             [
                 command.forward_speed[:, None] - command.yaw_rate[:, None] * home[..., 1],
@@ -160,7 +160,7 @@ class CpgController:
         along = np.where(stands, 0.5 - phase / duty, _ease((phase - duty) / (1.0 - duty)) - 0.5)
         sweep = self._sweep[self.gait][:, None, None] * stance_time[..., None] * velocity
         xy = home + along[..., None] * sweep
-        # A foot that swings goes further out by what is too much, and stays there while it stands.
+        # A swinging foot moves to its placement offset, and keeps it in the stance.
         moves = np.where(stands, 0.0, CONTROL_PERIOD / config.reach_time)[..., None]
         self._out = self._out + moves * (too_much[:, None] - self._out)
         xy = xy + self._out

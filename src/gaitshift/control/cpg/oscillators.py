@@ -45,8 +45,8 @@ body like a pendulum: only fast short steps near its middle keep it level."""
 class HopfNetwork:
     """ż = γ (1 − |z|²) z + i ω z + κ Σ_j (exp(i (φ_i − φ_j)) z_j − z_i), a z for each leg.
 
-    Its limit cycle is the unit circle, gone round once a stride; φ are the phases of the gait's
-    touchdowns, and offsets between legs converge to them from almost everywhere.
+    Its limit cycle is the unit circle, completed once per stride; φ are the phases of the gait's
+    touchdowns, to which offsets between legs converge from almost all states.
     """
 
     pull: float = 10.0

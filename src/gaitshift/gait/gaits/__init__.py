@@ -1,17 +1,15 @@
 """The gaits that come with the package: one TOML file each, beside this one.
 
 Gaits are data: a new file here is a new gait, and `load` takes any other file by its path. A file
-is checked when it is read, never run. It holds
+is checked when it is read, and no code in it runs. It holds
 
 - `name`, `title`, `description`: short name, name for people, what the gait is;
-- `dwell` [control steps], what a transition asks for that names no other, and `swing_height` [m, 0
-  if left out], up to which height of the swing a transition that names no other pays its bonus in
-  part;
-- `dwell_range` [control steps]: least and greatest dwell that may be commanded, by way of the
-  stride frequency; transitions that name their own keep their proportion. `dwell` alone if left
-  out;
+- `dwell` [control steps] and `swing_height` [m, 0 if left out]: defaults of the transitions; a
+  swing below its height earns only a part of the bonus;
+- `dwell_range` [control steps]: least and greatest dwell that may be commanded, through the stride
+  frequency; transitions with their own dwell keep their proportion. `dwell` alone if left out;
 - `speed` [m/s, the paper's 1.2 if left out] and `speed_range` [m/s, `speed` alone if left out]:
-  the nominal ones, and what may be commanded;
+  the nominal speed, and the range of the command;
 - `ideal_phase`: touchdown of each foot [fraction of the stride, 0 to below 1];
 - `[[state]]`, the first one initial: `name`, and `stance`, the feet down; or `name` and
   `accepting = true` for a state in which the run ends;

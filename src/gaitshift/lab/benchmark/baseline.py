@@ -18,10 +18,10 @@ from gaitshift.sim.terrain import flat
 
 
 class GaitVecEnv(VecEnv):
-    """The same robots, step for step.
+    """The same robots as a stable-baselines3 environment.
 
-    Where an episode ended, `infos` hands over its last observation and whether it was cut: PPO
-    bootstraps from there.
+    Where an episode ended, `infos` has its last observation and whether it was truncated, from
+    which PPO bootstraps.
     """
 
     def __init__(self, env: GaitEnv) -> None:
@@ -30,7 +30,7 @@ class GaitVecEnv(VecEnv):
         self._actions = np.zeros((env.num_envs, 12))
 
     def reset(self) -> np.ndarray:
-        """Starts all episodes anew, from the seed that `seed` was given, if it was."""
+        """Restarts all episodes, from the seed given to `seed`, if any."""
         observation, _ = self.env.reset(seed=self._seeds[0])
         self._reset_seeds()
         return observation
@@ -52,20 +52,20 @@ class GaitVecEnv(VecEnv):
         return observation, reward, done, infos
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Does nothing."""
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """The attribute of the whole environment, once for each robot."""
         return [getattr(self.env, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Refused with a `TypeError`: robots share one environment."""
+        """Raises `TypeError`: robots share one environment."""
         raise TypeError(f"robots share one environment: '{attr_name}' of some cannot be set")
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **_: Any
     ) -> list[Any]:
-        """Refused with a `TypeError`: robots share one environment."""
+        """Raises `TypeError`: robots share one environment."""
         raise TypeError(f"robots share one environment: '{method_name}' of some cannot be called")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: VecEnvIndices = None) -> list[bool]:
@@ -78,16 +78,16 @@ ROBOTS = 30
 
 
 class Baseline:
-    """PPO("MlpPolicy") and the flat environment of a recipe, with what it asks for growing alike.
+    """PPO("MlpPolicy") on the flat environment of a recipe, with the recipe's curriculum.
 
-    The curriculum is, at each number of control steps, the one that the recipe has there, so that
-    both learners are asked for the same.
+    At each number of control steps the curriculum is that of the recipe, so that both learners have
+    the same task.
     """
 
     def __init__(
         self, machine: RewardMachine, recipe: Recipe, seed: int, folder: Path, *, rollout: int
     ) -> None:
-        """Trains by `rollout` control steps a robot at a time; the policy goes into `folder`."""
+        """Trains by `rollout` control steps per robot at a time; the policy goes to `folder`."""
         torch.set_num_threads(recipe.threads)
         self._recipe = recipe
         self._seed = seed
@@ -109,7 +109,7 @@ class Baseline:
         self._ppo.learn(self._ppo.n_steps * ROBOTS, reset_num_timesteps=False)
 
     def export(self) -> Path:
-        """Writes the policy as it stands."""
+        """Writes the present policy."""
         network = self._ppo.policy
         layers = [*network.mlp_extractor.policy_net, network.action_net]
         training = {"learner": "stable-baselines3", "seed": self._seed, "steps": self.steps}

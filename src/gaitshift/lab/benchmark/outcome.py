@@ -1,4 +1,4 @@
-"""How a training came out, as a line of a table, and what several seeds of it amount to."""
+"""The outcome of a training as a row of a table, and summaries over several seeds."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -20,43 +20,43 @@ class Outcome:
     seed: int
     """Seed of networks, exploration and robots."""
     reached: bool
-    """Whether a check was passed; else the training was given up at its limit."""
+    """Whether a check was passed; else the training was stopped at its limit."""
     seconds: float
-    """Wall time of the training up to the last check, that of the checks left out [s]."""
+    """Wall time of the training up to the last check, without the checks [s]."""
     steps: int
-    """Control steps of all robots up to there."""
+    """Control steps of all robots up to the last check."""
     survival: float
-    """Figures of the last check: share of the robots that did not fall,"""
+    """Share of the robots that did not fall in the last check."""
     speed: float | None
-    """mean forward speed [m/s],"""
+    """Mean forward speed in the last check [m/s]; None where all robots fell in the warm-up."""
     pattern_fraction: float | None
-    """share of the steps that show a stance of the machine; None of both where all fell at once."""
+    """Share of the steps of the last check with a stance of the machine; None as for `speed`."""
     recipe: str
-    """Fingerprint of what was trained and how it was checked (`time_to_gait.fingerprint`)."""
+    """Fingerprint of the training and its checks (`time_to_gait.fingerprint`)."""
 
 
 def middle(outcomes: Sequence[Outcome]) -> Outcome:
-    """The median training by wall time, the later of two; one that was given up counts as last."""
+    """The median training by wall time, of two the slower; a stopped training counts as slowest."""
     ranked = sorted(outcomes, key=lambda outcome: (not outcome.reached, outcome.seconds))
     return ranked[len(ranked) // 2]
 
 
 def ratio(ours: Outcome, baseline: Outcome) -> float | None:
-    """How many times as long the baseline took; a lower bound where it was given up.
+    """The baseline's wall time over ours; a lower bound where the baseline was stopped.
 
-    None where ours was given up: then nothing can be said.
+    None where ours was stopped.
     """
     return baseline.seconds / ours.seconds if ours.reached else None
 
 
 def ratio_text(times: float, *, is_lower_bound: bool) -> str:
-    """A ratio in two figures or more, rounded down: so a lower bound stays one."""
+    """A ratio with at least two digits, rounded down so that a lower bound stays valid."""
     text = f"{floor(times)}" if times >= 10 else f"{floor(10 * times) / 10:.1f}"
     return f"> {text}" if is_lower_bound else text
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """By gait: each learner's median and seeds, and the ratio where the first's is known."""
+    """By gait: each learner's median and seeds, and the ratio where ours reached the gait."""
     return {
         gait: _of_gait([outcome for outcome in outcomes if outcome.gait == gait])
         for gait in dict.fromkeys(outcome.gait for outcome in outcomes)
@@ -68,7 +68,7 @@ def _of_gait(outcomes: list[Outcome]) -> dict[str, Any]:
     for outcome in outcomes:
         rows.setdefault(outcome.learner, []).append(outcome)
     medians = {learner: middle(row) for learner, row in rows.items()}
-    told = {
+    learners = {
         learner: {
             "reached": median.reached,
             "seconds": median.seconds,
@@ -78,10 +78,10 @@ def _of_gait(outcomes: list[Outcome]) -> dict[str, Any]:
         for learner, median in medians.items()
     }
     if len(medians) < 2:
-        return {"learners": told, "ratio": None, "ratio_is_lower_bound": False}
+        return {"learners": learners, "ratio": None, "ratio_is_lower_bound": False}
     ours, baseline = medians.values()
     return {
-        "learners": told,
+        "learners": learners,
         "ratio": ratio(ours, baseline),
         "ratio_is_lower_bound": not baseline.reached,
     }
@@ -110,13 +110,13 @@ _MAY_BE_EMPTY = ("speed", "pattern_fraction")
 
 
 def row_of(outcome: Outcome) -> Row:
-    """The line of a table that an outcome is; `outcome_of` makes it one again."""
+    """An outcome as a row of a table; `outcome_of` is the inverse."""
     row = asdict(outcome)
     return {name: round(x, 3) if isinstance(x, float) else x for name, x in row.items()}
 
 
 def outcome_of(row: Row) -> Outcome:
-    """The outcome that a line of a table is; figures that stand empty there are None.
+    """The outcome in a row of a table; figures with empty cells are None.
 
     Raises:
         GaitshiftError: another cell is empty.

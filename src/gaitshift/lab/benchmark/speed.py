@@ -1,4 +1,4 @@
-"""Speed: the environment beside bare physics, training on top, and replays of a rule on a grid."""
+"""Speed of the environment, of bare physics, of training, and of replays of a rule on a grid."""
 
 import time
 from collections.abc import Callable
@@ -16,16 +16,16 @@ from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import from_spec
 
 ROUNDS = 7
-"""Rounds in which both are measured in turn; medians over them are quoted."""
+"""Rounds in which both are measured alternately; the results are medians over them."""
 
 EPISODES, EPISODE_SECONDS = 1000, 20.0
 ALPHAS, BETAS = np.linspace(0.002, 0.2, 100), np.arange(1000.0)
-"""What a replay is measured on: episodes, their length [s], α and β [counts] of the grid."""
+"""Workload of a replay: episodes, their length [s], α and β [counts] of the grid."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedConfig:
-    """What the speed is measured on."""
+    """Workload of the speed measurement."""
 
     robots: int = 128
     """Robots in parallel."""
@@ -49,10 +49,9 @@ class SpeedConfig:
 def environment_speed(
     config: SpeedConfig, report: Callable[[int, int], None] = lambda done, total: None
 ) -> dict[str, float]:
-    """Control steps of a robot a second [1/s], and their ratio.
+    """Control steps per second, summed over all robots [1/s], and their ratio.
 
-    Environment and bare physics make the same motion: the robots step through the same small random
-    actions.
+    Environment and bare physics compute the same motion, with the same small random actions.
     """
     ground = from_spec(config.terrain, seed=config.seed, length=20.0, width=20.0)
     env = GaitEnv(gaits.load("trot"), ground, config.robots)
@@ -76,7 +75,7 @@ def environment_speed(
 
 
 def training_speed(seed: int) -> dict[str, float]:
-    """Control steps of a robot a second of training [1/s], and what the flat stage then takes.
+    """Control steps per second of training over all robots [1/s], and the time of the flat stage.
 
     Raises:
         ImportError: torch or rsl_rl is not installed.
@@ -103,7 +102,7 @@ def training_speed(seed: int) -> dict[str, float]:
 
 
 class _Bare:
-    """MuJoCo's own batch on the same model, driven to the same targets, and nothing else."""
+    """MuJoCo's own batch on the same model with the same joint targets, and nothing else."""
 
     def __init__(self, env: GaitEnv, actions: np.ndarray) -> None:
         world = env.world
@@ -128,8 +127,8 @@ def _time(work: Callable[[], object]) -> float:
 def replay_speed(seed: int) -> dict[str, float]:
     """Time [s] to find the first firings of six pairs of feet over the whole grid.
 
-    Heights change at random times, as touches do; with a leak the counter must be run through step
-    by step.
+    Heights change at random times, as at touchdowns. With a leak the counter is computed step by
+    step.
     """
     from gaitshift.lab.identification import first_firings  # needs scipy
 

@@ -21,33 +21,33 @@ from gaitshift.learn.recipe import Recipe
 
 @dataclass(frozen=True, kw_only=True)
 class Figures:
-    """What a check saw, after the evaluation's warm-up of 2 s."""
+    """Figures of a check, after the evaluation's warm-up of 2 s."""
 
     survival: float
     """Share of the robots that did not fall."""
     speed: float | None
     """Mean forward speed [m/s]; None where all fell in the warm-up."""
     pattern_fraction: float | None
-    """Share of the steps that show a stance of the gait's machine; None as well."""
+    """Share of the steps with a stance of the gait's machine; None as for `speed`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Criterion:
-    """Robots on flat ground without exploration noise, and what they must reach there."""
+    """Robots on flat ground without exploration noise, and the figures that they must reach."""
 
     survival: float = 0.99
     """Least share of robots that do not fall."""
     speed_error: float = 0.1
-    """Greatest |mean forward speed - the gait's own| [m/s]."""
+    """Greatest |mean forward speed - the gait's nominal speed| [m/s]."""
     pattern_fraction: float = 0.6
     """Least share of steps that show a stance of the machine."""
     robots: int = 64
-    """Robots at once, so that at 0.99 not one may fall."""
+    """Number of robots; at a survival of 0.99 none of 64 may fall."""
     seconds: float = 6.0
     """Length of the run [s]."""
 
     def see(self, policy: Policy) -> Figures:
-        """Runs the policy at its own speed and stride frequency; the same figures every time."""
+        """Runs the policy at its nominal speed and stride frequency; deterministic."""
         config = EvaluationConfig(episodes=self.robots, seconds=self.seconds)
         seen, _ = evaluate(policy, config)
         return Figures(
@@ -57,7 +57,7 @@ class Criterion:
         )
 
     def is_passed(self, figures: Figures, own_speed: float) -> bool:
-        """Whether the figures are those of the gait at `own_speed` [m/s]."""
+        """Whether the figures meet the criterion for a gait of nominal speed `own_speed` [m/s]."""
         if figures.speed is None or figures.pattern_fraction is None:
             return False
         return (
@@ -68,7 +68,7 @@ class Criterion:
 
 
 GAITSHIFT, BASELINE = "gaitshift", "stable-baselines3"
-"""The learners, as outcomes name them."""
+"""Names of the learners in outcomes."""
 
 
 def _flat_stage() -> Recipe:
@@ -78,20 +78,20 @@ def _flat_stage() -> Recipe:
 
 @dataclass(frozen=True, kw_only=True)
 class TimeToGait:
-    """What is trained, and when it is looked at."""
+    """The trainings, and when they are checked."""
 
     gaits: tuple[str, ...] = ("trot", "pace", "bound")
     """The paper's three."""
     seeds: int = 3
-    """Each gait is trained from this many seeds by each learner,"""
+    """Number of seeds for each gait and learner."""
     first_seed: int = 0
-    """of which this is the first."""
+    """First seed; the others follow it."""
     baseline_budget: float = 600.0
-    """Training time after which a baseline is given up [s]; 0: no baseline."""
+    """Training time after which a baseline is stopped [s]; 0: no baseline."""
     recipe: Recipe = field(default_factory=_flat_stage)
-    """Ours: the flat stage of the default recipe, at whose end it is given up."""
+    """Ours: the flat stage of the default recipe; a training is stopped at its end."""
     check: Criterion = field(default_factory=Criterion)
-    """What ends a training."""
+    """The criterion that ends a training."""
     check_every: int = 10
     """Iterations of ours between two checks; half a baseline's rollout at its defaults."""
     baseline_rollout: int = 2048
@@ -114,12 +114,12 @@ class TimeToGait:
 
     @property
     def trainings(self) -> int:
-        """How many outcomes there will be."""
+        """Number of trainings, and so of outcomes."""
         return len(self.gaits) * self.seeds * (2 if self.baseline_budget > 0 else 1)
 
     @classmethod
     def quick(cls) -> "TimeToGait":
-        """Seconds of trot on few robots: shows that all of it works, not how fast it is."""
+        """Trot for seconds on few robots: a test run, not a measurement."""
         return cls(
             gaits=("trot",),
             seeds=1,
@@ -132,7 +132,7 @@ class TimeToGait:
 
 
 class Trainer(Protocol):
-    """A training that goes on from check to check."""
+    """A training that is stepped from check to check."""
 
     @property
     def steps(self) -> int:
@@ -144,13 +144,13 @@ class Trainer(Protocol):
         ...
 
     def export(self) -> Path:
-        """Writes the policy as it stands, and says where."""
+        """Writes the present policy, and returns its path."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Entry:
-    """A learner in the race, and when it is given up."""
+    """A learner in the comparison, and its limit."""
 
     name: str
     build: Callable[[RewardMachine, int, Path], Trainer]
@@ -158,38 +158,38 @@ class _Entry:
     most_seconds: float = inf
 
     def knows(self, known: Outcome, gait: str, seed: int) -> bool:
-        """Whether an outcome is this entry's, and no longer a training would tell more."""
+        """Whether an outcome is of this entry, and a longer training would add nothing."""
         if (known.learner, known.gait, known.seed) != (self.name, gait, seed):
             return False
         return known.reached or self.gives_up(known.steps, known.seconds)
 
     def gives_up(self, steps: int, seconds: float) -> bool:
-        """Whether a training has come to its limit."""
+        """Whether a training has reached its limit."""
         return steps >= self.most_steps or seconds >= self.most_seconds
 
 
 def fingerprint(config: TimeToGait, learner: str, machine: RewardMachine) -> str:
-    """Of all that decides what a training does and when it has its gait, but its seed."""
-    told = {
+    """Fingerprint of all settings of a training and its checks except the seed."""
+    settings = {
         "machine": machine.to_dict(),
         "recipe": asdict(config.recipe),
         "check": asdict(config.check),
         "rollout": config.check_every if learner == GAITSHIFT else config.baseline_rollout,
     }
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:12]
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def is_of(config: TimeToGait, outcome: Outcome) -> bool:
-    """Whether a measurement would train the same as an outcome tells of, from whatever seed."""
+    """Whether an outcome is of the same training as in this measurement, from any seed."""
     if outcome.gait not in config.gaits:
         return False
     return outcome.recipe == fingerprint(config, outcome.learner, gaits.load(outcome.gait))
 
 
 def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator[Outcome]:
-    """Trains every gait from every seed, ours and the baseline in turn; an outcome at a time.
+    """Trains every gait from every seed, ours and the baseline alternately; yields each outcome.
 
-    Those that are `known` already are told as they are; of another recipe, they are not known.
+    Outcomes in `known` are yielded without training, unless they are of another recipe.
 
     Raises:
         GaitshiftError: a package that training needs is not installed.
@@ -199,8 +199,8 @@ def time_to_gait(config: TimeToGait, known: Sequence[Outcome] = ()) -> Generator
     for seed in range(config.first_seed, config.first_seed + config.seeds):
         for gait in config.gaits:
             for entry in entries:
-                told = (outcome for outcome in known if entry.knows(outcome, gait, seed))
-                yield next(told, None) or _train(entry, gaits.load(gait), seed, config)
+                earlier = (outcome for outcome in known if entry.knows(outcome, gait, seed))
+                yield next(earlier, None) or _train(entry, gaits.load(gait), seed, config)
 
 
 def _entries(config: TimeToGait) -> list[_Entry]:
@@ -234,7 +234,7 @@ def _entries(config: TimeToGait) -> list[_Entry]:
 
 
 def _train(entry: _Entry, machine: RewardMachine, seed: int, config: TimeToGait) -> Outcome:
-    """Trains until a check is passed or the learner is given up; only training is timed."""
+    """Trains until a check is passed or the limit is reached; only training is timed."""
     check = config.check
     with TemporaryDirectory() as folder:
         start = time.perf_counter()

@@ -1,4 +1,4 @@
-"""`gaitshift train`, from check to check."""
+"""The trainer of `gaitshift train`, stepped from check to check."""
 
 from pathlib import Path
 
@@ -8,12 +8,12 @@ from gaitshift.learn.run import POLICY, Run
 
 
 class GaitshiftTrainer:
-    """A training run that keeps no record of itself but its policy."""
+    """A training run that writes only its policy."""
 
     def __init__(
         self, machine: RewardMachine, recipe: Recipe, seed: int, folder: Path, *, iterations: int
     ) -> None:
-        """Trains by `iterations` at a time; the policy goes into `folder`."""
+        """Trains `iterations` at a time; writes the policy to `folder`."""
         self._run = Run(folder, machine, recipe, seed, "gaitshift bench time-to-gait")
         self._iterations = iterations
 
@@ -28,6 +28,6 @@ class GaitshiftTrainer:
             self._run.iterate()
 
     def export(self) -> Path:
-        """Writes the policy as it stands."""
+        """Writes the present policy."""
         self._run.export()
         return self._run.folder / POLICY

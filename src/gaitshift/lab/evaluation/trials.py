@@ -240,5 +240,5 @@ def _row(
         return Row(trial=title, value=float(outcomes.mean()), bound="at_least", limit=limit)
     # "higher" takes the error of one robot; interpolation with inf gives NaN.
     value = float(np.quantile(outcomes, 0.95, method="higher"))
-    kept = value if np.isfinite(value) else None
-    return Row(trial=title, value=kept, bound="at_most", limit=limit)
+    finite = value if np.isfinite(value) else None
+    return Row(trial=title, value=finite, bound="at_most", limit=limit)

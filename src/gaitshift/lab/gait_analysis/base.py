@@ -11,11 +11,11 @@ _SHORTEST_DRIFT = 0.5
 """Robots that fall sooner after the warm-up have no drift [s]."""
 
 Figure = float | None
-"""None: there was nothing to measure."""
+"""None: nothing to measure."""
 
 
 def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
-    """What `measure` says of base and joints, for robots of this kind."""
+    """The figures of `measure` for base and joints of this robot."""
     log, alive = sample.log, sample.alive
     if sample.steps == 0:
         return dict.fromkeys(_NAMES)
@@ -58,7 +58,7 @@ _NAMES = (
 
 
 def lateral_error(log: Log) -> Figure:
-    """95th percentile over robots on their feet of how far they end from where y began [m]."""
+    """95th percentile over robots on their feet of their final distance from their line [m]."""
     upright = ~log.fallen[-1]
     if not upright.any():
         return None
@@ -73,9 +73,9 @@ def lateral_error(log: Log) -> Figure:
 
 
 def _heading_drift(sample: Sample) -> Figure:
-    """Root mean square over the robots of the rate at which they turn beyond their command [rad/s].
+    """Root mean square over the robots of their mean yaw rate less the commanded one [rad/s].
 
-    A robot that needs a steady command to go straight drifts by that, though it keeps its line.
+    A robot that needs a constant command to walk straight drifts by it, though it keeps its line.
     """
     last = sample.alive.sum(axis=0) - 1
     long_enough = np.flatnonzero(last * sample.period >= _SHORTEST_DRIFT)

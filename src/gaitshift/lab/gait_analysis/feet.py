@@ -11,13 +11,13 @@ from gaitshift.lab.gait_analysis.phase import Phases, axial_of
 from gaitshift.lab.gait_analysis.sample import Sample
 
 PerFoot = list[float] | None
-"""In the order of `LEGS`; None: there was nothing to measure."""
+"""Values in the order of `LEGS`; None: nothing to measure."""
 
 
 def feet_figures(
     sample: Sample, machines: Mapping[str, RewardMachine]
 ) -> dict[str, Figure | PerFoot | list[Figure]]:
-    """What `measure` says of feet and machines."""
+    """The figures of `measure` for feet and machines."""
     steps, contact = sample.steps, sample.contact
     cycles = sample.entries(machines)
     whole = _whole_cycles(cycles)
@@ -48,7 +48,7 @@ def _where(known: list[bool], values: Float[np.ndarray, " 4"]) -> list[Figure]:
 def _whole_cycles(entry: Bool[np.ndarray, "T N"]) -> Bool[np.ndarray, "T N"]:
     """Where each robot is between its first and its last entry into a cycle.
 
-    Over the whole time half a cycle at either end would count on one side alone.
+    Figures over whole cycles only: a partial cycle at either end would count some feet more often.
     """
     before = entry.cumsum(axis=0) - entry
     return (before >= 1) & (before < entry.sum(axis=0))
@@ -60,7 +60,7 @@ def _touchdowns_per_cycle(
     entry: Bool[np.ndarray, "T N"],
     whole: Bool[np.ndarray, "T N"],
 ) -> PerFoot:
-    """Onsets over what whole cycles ask for."""
+    """Onsets over the touchdowns of the machine in whole cycles."""
     counts = np.bincount(sample.log.gait[entry & whole], minlength=len(sample.log.gaits))
     expected = counts @ np.array([machines[name].touchdowns for name in sample.log.gaits])
     if not expected.all():
@@ -69,7 +69,7 @@ def _touchdowns_per_cycle(
 
 
 def _duty_factor(sample: Sample, whole: Bool[np.ndarray, "T N"]) -> list[float]:
-    """Share of the steps of whole cycles, of all steps where there is no cycle."""
+    """Share of the steps of whole cycles that each foot is down; of all steps without a cycle."""
     taken = whole if whole.any() else sample.alive
     down = (sample.contact & taken[..., None]).sum(axis=(0, 1))
     return (down / taken.sum()).tolist()
@@ -88,7 +88,7 @@ def _clearance(sample: Sample, leg: int) -> Figure:
 
 
 def _slip(sample: Sample) -> Figure:
-    """Mean horizontal speed of feet that are down in two steps running [m/s]."""
+    """Mean horizontal speed of feet that are down in two successive steps [m/s]."""
     position = sample.log.truth.foot_position_w[..., :2]
     both = sample.contact[1:] & sample.contact[:-1]
     if not both.any():

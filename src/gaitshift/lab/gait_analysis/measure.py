@@ -18,13 +18,13 @@ def measure(
 ) -> dict[str, Any]:
     """Figures of a log, over all robots while they are on their feet, after the warm-up.
 
-    Robots are pooled. A figure is None where there was nothing to measure it by.
+    Robots are pooled. A figure is None where there was nothing to measure.
 
     - `survival`: share of robots that never fell, warm-up included.
     - `speed_mean` [m/s]: mean velocity along body x; `speed_error` [m/s]: its distance from the
       mean command; `speed_rmse` [m/s]: root mean square of the difference at each step.
-    - `heading_drift` [rad/s]: root mean square over robots of the net turn beyond the commanded, by
-      the time it took; `heading_error_sd` [rad]: spread of the heading about the line x.
+    - `heading_drift` [rad/s]: root mean square over robots of the net turn less the commanded turn,
+      over its time; `heading_error_sd` [rad]: spread of the heading about the line x.
     - `cost_of_transport`: mean mechanical power Σ|τ q̇| over m·g·v.
     - `froude`: v²/(g h), v the mean speed, h the median height of the base over the lowest foot.
     - `roll_rate_sd`, `pitch_rate_sd` [rad/s]: spread of the body's angular velocity about x and y.
@@ -32,23 +32,23 @@ def measure(
     - `slip` [m/s]: mean horizontal speed of the feet in contact.
     - `pattern_fraction`: share of steps whose contacts are a stance set of the gait's machine.
     - `cycles_per_s` [Hz]: full cycles of the machine, counted by entries into its first state.
-    - `touchdowns_per_cycle` (4,): raw contact onsets of each foot over those that the machine
-      asks for, in whole cycles: 1 where no foot bounces, also where it comes down twice a cycle.
+    - `touchdowns_per_cycle` (4,): raw contact onsets of each foot over those of the machine, in
+      whole cycles: 1 where no foot bounces, also for a gait with two touchdowns per cycle.
     - `phase` (4,) [stride of FL], `phase_consistency` (4,): circular mean and resultant length of
       touchdowns within the strides of FL (`phase.Phases`), 0 and 1 for FL itself.
     - `duty_factor` (4,): share of the time of whole cycles that each foot is down.
-    - `clearance` (4,) [m]: median over strides of the highest that the sole is above the ground.
+    - `clearance` (4,) [m]: median over strides of the greatest height of the sole over the ground.
     - `flight_fraction`: share of steps with no foot down.
     - `lateral_error_p95` [m]: 95th percentile of the distance from the line, at the end.
     - `verdict`: `gait`, the name by the contacts alone, or "none"; `scores` of every known gait;
-      `clean`, whether the name is that of the gait in force and all its limits are kept; `misses`,
-      the limits that are not.
+      `clean`, whether the name is that of the active gait and all its limits are met; `misses`,
+      the limits that are not met.
 
     Args:
         log: the run; where it has several gaits, phases and verdict are those of the one that was
-            in force for most of the time.
+            active for most of the time.
         machines: the machines of the gaits in it, by name.
-        robot: the robot of the log: its mass and the limit of its joints' speed count.
+        robot: the robot of the log, for its mass and its joint speed limit.
         warm_up: seconds left out.
     """
     sample = Sample.of(log, warm_up)

@@ -1,4 +1,4 @@
-"""Names the gait of robots by their contacts alone, whatever gait was asked for."""
+"""Names the gait of robots by their contacts alone, independent of the commanded gait."""
 
 from collections.abc import Iterable, Mapping
 
@@ -12,11 +12,11 @@ from gaitshift.lab.gait_analysis.sample import Sample
 from gaitshift.robot.legs import LABEL_COUNT, label_of
 
 NONE = "none"
-"""The name of what is no known gait."""
+"""The name for contacts of no known gait."""
 
 LEAST_SCORE = 0.2
-"""Below it no gait is named. Ours: noise, standing and flicker stay below 0.1; a gait that shows
-its stance sets half of the time, with feet that touch twice a cycle, comes to 0.25."""
+"""No gait is named below this score. Ours: noise, standing and flicker stay below 0.1; a gait that
+shows its stance sets half of the time, with feet that touch twice a cycle, scores 0.25."""
 
 
 def gait_scores(sample: Sample, others: Iterable[RewardMachine] = ()) -> dict[str, float]:
@@ -24,14 +24,14 @@ def gait_scores(sample: Sample, others: Iterable[RewardMachine] = ()) -> dict[st
 
     It is the product phase · rhythm · pattern · firmness.
 
-    - phase: of the foot that keeps it worst, the resultant length times the cosine of its distance
-      from the ideal phase;
-    - rhythm: of the foot that keeps it worst, touchdowns a stride of FL against the machine's, the
-      smaller over the larger;
+    - phase: resultant length times the cosine of the distance from the ideal phase, of the worst
+      foot;
+    - rhythm: touchdowns per stride of FL and those of the machine, the smaller over the larger, of
+      the worst foot;
     - pattern: `share_in_order`;
-    - firmness: of the foot that bounces most, touchdowns that end a swing over all onsets.
+    - firmness: touchdowns that end a swing over all onsets, of the foot that bounces most.
 
-    A gait with a leading side is known by its mirror image as well: the better of both counts.
+    For a gait with a leading side the better score of the gait and its mirror image counts.
     """
     machines = {name: gaits.load(name) for name in gaits.names()}
     machines |= {machine.name: machine for machine in others}
@@ -41,7 +41,7 @@ def gait_scores(sample: Sample, others: Iterable[RewardMachine] = ()) -> dict[st
 
 
 def name_gait(scores: Mapping[str, float]) -> str:
-    """The gait of the best score, or `NONE` where even that is below `LEAST_SCORE`."""
+    """The gait with the best score, or `NONE` where that is below `LEAST_SCORE`."""
     best = max(scores, key=lambda name: scores[name])
     return best if scores[best] >= LEAST_SCORE else NONE
 
@@ -61,8 +61,8 @@ def _firmness(sample: Sample) -> float:
 def _phase(phases: Phases, machine: RewardMachine) -> float:
     axial = axial_of(machine)
     ideal = np.exp(2j * np.pi * np.array(axial) * ideal_of(machine))
-    kept = np.real(phases.moments(axial) * np.conj(ideal))
-    return max(0.0, float(kept.min()))
+    agreement = np.real(phases.moments(axial) * np.conj(ideal))
+    return max(0.0, float(agreement.min()))
 
 
 def _rhythm(phases: Phases, machine: RewardMachine) -> float:
@@ -79,8 +79,8 @@ def _pattern(sample: Sample, machine: RewardMachine) -> float:
 
 
 BRIEF = 3
-"""Patterns shown for fewer control steps are passed over: feet that land together land some 10 ms
-apart, and what stands in between may look like a stance set out of order. Ours."""
+"""Patterns shown for fewer control steps are ignored. Ours: feet that land together touch about
+10 ms apart, and the pattern in between may be a stance set out of order."""
 
 
 def share_in_order(
@@ -88,11 +88,11 @@ def share_in_order(
 ) -> float:
     """Share of the steps of robots on their feet that show a stance set of the gait in its order.
 
-    Other patterns between two stance sets are passed over, as landings take a few steps, and so are
-    stance sets that are shown for less than `BRIEF`. A stance set is in order where it and the two
-    shown before it follow each other in the machine's cycle: two would not tell a half-bound, left
-    and right hind foot in turn, from one that often lands on the same. A robot that stays in one
-    stance set shows no order.
+    Other patterns between two stance sets are ignored, as landings take a few steps, and so are
+    stance sets shown for less than `BRIEF`. A stance set is in order where it and the two shown
+    before it follow each other in the machine's cycle. Two would not be enough: a half-bound that
+    alternates its hind feet and one that often lands on the same foot would score alike. A robot
+    that stays in one stance set shows no order.
     """
     cycle = _cycle(machine)
     steps = len(alive)
@@ -113,7 +113,7 @@ def share_in_order(
 def _visits(
     label: Int[np.ndarray, " K"], robot: Int[np.ndarray, " K"]
 ) -> tuple[Int[np.ndarray, " V"], Int[np.ndarray, " V"]]:
-    """Where each robot begins to show another label, and for how many of the K it shows it."""
+    """Where each robot begins to show another label, and for how many of the K steps."""
     visit = np.flatnonzero(np.diff(LABEL_COUNT * robot + label, prepend=-1) != 0)
     return visit, np.diff(visit, append=label.size)
 

@@ -1,8 +1,8 @@
-"""When feet come down within the stride of FL: circular means, and how firmly they are kept.
+"""Touchdown phases within the stride of FL: circular means and resultant lengths.
 
-A foot that comes down p times a stride by its gait gives p-axial data: angles are multiplied by p,
-their mean and resultant length taken, and the mean divided by p (Fisher, Statistical Analysis of
-Circular Data, 1993, 2.3). Without that, two touchdowns half a stride apart have no mean at all.
+A foot with p touchdowns per stride of its gait gives p-axial data: angles are multiplied by p,
+their mean and resultant length are computed, and the mean is divided by p (Fisher, Statistical
+Analysis of Circular Data, 1993, 2.3). Otherwise two touchdowns half a stride apart have no mean.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,10 @@ SHORTEST, LONGEST = 0.2, 2.5
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Phases:
-    """Touchdowns within strides of FL, which go from one touchdown of FL to the next.
+    """Touchdowns within strides of FL, each from one touchdown of FL to the next.
 
-    Touchdowns end a swing (`Sample.touchdowns`), so that a bounce of FL does not break its stride
-    in two; how much feet bounce is told by `touchdowns_per_cycle`. Robots are pooled.
+    Touchdowns end a swing (`Sample.touchdowns`), so that a bounce of FL does not split its stride.
+    `touchdowns_per_cycle` measures the bounces. Robots are pooled.
     """
 
     fractions: tuple[Float[np.ndarray, " _"], ...]
@@ -32,7 +32,7 @@ class Phases:
 
     @classmethod
     def of(cls, touchdowns: Bool[np.ndarray, "L N 4"], period: float) -> "Phases":
-        """Phases of the touchdowns of N robots, `period` [s] a control step."""
+        """Phases of the touchdowns of N robots; `period` [s] is the time of a control step."""
         steps = touchdowns.shape[0]
         rows = touchdowns.transpose(1, 0, 2).reshape(-1, 4)
         reference = np.flatnonzero(rows[:, 0])
@@ -62,7 +62,7 @@ class Phases:
 
 
 def axial_of(machine: RewardMachine) -> tuple[int, ...]:
-    """How often each foot comes down in a stride of FL by its machine; at least 1."""
+    """Touchdowns of each foot per stride of FL by its machine; at least 1."""
     reference = max(machine.touchdowns[0], 1)
     return tuple(max(1, count // reference) for count in machine.touchdowns)
 

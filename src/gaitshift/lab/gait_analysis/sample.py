@@ -1,4 +1,4 @@
-"""The part of a log that figures are taken from: after the warm-up, robots on their feet."""
+"""The part of a log from which figures are computed: robots on their feet after the warm-up."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD
 
 AIR = 0.06
-"""A foot that is up for less has bounced and not swung [s]. Ours: the shortest swing that a gait
-here asks for is 0.08 s, bounces last 0.01 to 0.04 s."""
+"""A foot that is up for less time has bounced, not swung [s]. Ours: the shortest swing of the
+shipped gaits is 0.08 s, bounces last 0.01 to 0.04 s."""
 
 GROUND = 0.03
-"""A foot that is down for less has stubbed and not stood [s]. Ours: the shortest stance that a gait
-here asks for is 0.08 s."""
+"""A foot that is down for less time has stubbed, not stood [s]. Ours: the shortest stance of the
+shipped gaits is 0.08 s."""
 
 
 def onsets(contact: Bool[np.ndarray, "T N 4"]) -> Bool[np.ndarray, "T N 4"]:
@@ -28,10 +28,10 @@ def onsets(contact: Bool[np.ndarray, "T N 4"]) -> Bool[np.ndarray, "T N 4"]:
 
 
 def steady(contact: Bool[np.ndarray, "T N 4"], period: float) -> Bool[np.ndarray, "T N 4"]:
-    """Contacts with bounces taken for stance, and then stubs for swing.
+    """Contacts in which bounces count as stance and stubs as swing.
 
-    Gaps shorter than `AIR` are closed first, contacts shorter than `GROUND` dropped after that.
-    Stretches that reach the start or the end of the log stay, for their length is not known.
+    Gaps shorter than `AIR` are closed first, then contacts shorter than `GROUND` are dropped.
+    Stretches that reach the start or the end of the log stay, because their length is unknown.
     `period` is the time of a step [s].
     """
     steps = contact.shape[0]
@@ -44,7 +44,7 @@ def steady(contact: Bool[np.ndarray, "T N 4"], period: float) -> Bool[np.ndarray
 def _without_short(
     rows: Bool[np.ndarray, "R T"], *, value: bool, least: float
 ) -> Bool[np.ndarray, "R T"]:
-    """Rows whose inner stretches of `value` shorter than `least` steps are turned over."""
+    """Rows in which inner stretches of `value` shorter than `least` steps are inverted."""
     count, steps = rows.shape
     if rows.size == 0:
         return rows
@@ -60,17 +60,17 @@ def _without_short(
 
 
 WARM_UP = 2.0
-"""Seconds from the start that are left out of every figure but survival and lateral error."""
+"""Seconds at the start that are left out of every figure except survival and lateral error."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sample:
-    """L control steps of N robots; after its fall a robot counts no more."""
+    """L control steps of N robots; a robot does not count after its fall."""
 
     log: Log
     """The log from the end of the warm-up on."""
     whole: Log
-    """The log with its warm-up: what happens at the first step shows against the one before."""
+    """The log with its warm-up, whose last step precedes the first of the sample."""
 
     @classmethod
     def of(cls, log: Log, warm_up: float = WARM_UP) -> "Sample":
@@ -111,7 +111,7 @@ class Sample:
         return self._late(steps) & self.alive[..., None]
 
     def entries(self, machines: Mapping[str, RewardMachine]) -> Bool[np.ndarray, "L N"]:
-        """Where a machine comes back into its first state: a cycle is full."""
+        """Where a machine returns to its first state, and so completes a cycle."""
         log = self.whole
         first = np.array([machines[gait].initial for gait in log.gaits])
         in_first = log.machine_state == first[log.gait]
@@ -121,12 +121,12 @@ class Sample:
         return self._late(entry) & self.alive
 
     def gait(self) -> str:
-        """The gait that was in force for most of the time."""
+        """The gait that was active for most of the time."""
         counts: Int[np.ndarray, " G"] = np.bincount(
             self.log.gait.ravel(), minlength=len(self.log.gaits)
         )
         return self.log.gaits[int(counts.argmax())]
 
     def _late(self, course: Bool[np.ndarray, "T *rest"]) -> Bool[np.ndarray, "L *rest"]:
-        """What of a course over the whole log falls into the sample."""
+        """The part of an array over the whole log that belongs to the sample."""
         return course[len(self.whole.time) - len(self.log.time) :]

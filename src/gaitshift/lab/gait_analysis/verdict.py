@@ -77,26 +77,26 @@ class Check:
     """One figure against its limit."""
 
     figure: str
-    """What is held against the limit: a field of `Limits`."""
+    """Name of the figure: a field of `Limits`."""
     foot: str | None = None
-    """The foot that comes off worst, where the limit is for each; by its name in `LEGS`."""
+    """The worst foot, where the limit is for each foot; its name in `LEGS`."""
     value: float | None
-    """None: nothing was there to measure, which passes no limit."""
+    """None: nothing to measure, which does not pass."""
     bound: Literal["at_least", "at_most"]
-    """Which side of the limit is right."""
+    """Whether the limit is a lower or an upper bound."""
     limit: float
     """In the unit of the figure."""
 
     @property
     def passed(self) -> bool:
-        """Whether the value keeps the limit."""
+        """Whether the value meets the limit."""
         if self.value is None:
             return False
         return self.value >= self.limit if self.bound == "at_least" else self.value <= self.limit
 
     @property
     def unit(self) -> str:
-        """Of value and limit; empty where they are shares."""
+        """Unit of value and limit; empty for shares."""
         return _UNITS.get(self.figure, "")
 
     def to_dict(self) -> dict[str, Any]:
@@ -106,10 +106,10 @@ class Check:
 
 
 def checks(figures: Mapping[str, Any], machine: RewardMachine) -> tuple[Check, ...]:
-    """All limits of the machine's gait against the figures that `measure` gives.
+    """Checks of the figures of `measure` against all limits of the machine's gait.
 
-    Of limits on each foot the worst foot is shown. Duty factors are held against each other where
-    the gait is its own mirror image.
+    A limit on each foot gives the check of the worst foot. Duty factors of left and right are
+    compared where the gait is its own mirror image.
     """
     limits = limits_of(machine.name)
     touchdowns = figures["touchdowns_per_cycle"]
@@ -144,7 +144,7 @@ def _whole(
 def _worst(
     limits: Limits, figure: str, values: Any, bound: Literal["at_least", "at_most"]
 ) -> Check:
-    """Check of the foot whose value is worst; one without a value is worse than any."""
+    """Check of the foot with the worst value; a foot without a value counts as worst."""
     limit = getattr(limits, figure)
     if values is None:
         return Check(figure=figure, value=None, bound=bound, limit=limit)

@@ -1,4 +1,4 @@
-"""The conditions that are compared: a statistic each, with the α and leaks that are tried."""
+"""The conditions that are compared: a statistic each, with α and leaks to try."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
@@ -20,30 +20,31 @@ BETAS = np.concatenate([[0.0], np.unique(np.rint(np.geomspace(1.0, 5000.0, 120))
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A condition but for its numbers."""
+    """A condition without its numbers."""
 
     name: str
-    """As on the command line."""
+    """Name on the command line."""
     values: Callable[[LabelledRun], Float[np.ndarray, "T N M"]]
-    """What it watches on a recording."""
+    """Computes its values on a recording."""
     low: float
     """Smallest α that is tried, in `unit`."""
     high: float
-    """Largest α that is tried; those between them lie evenly on a logarithmic scale."""
+    """Largest α that is tried; the values between are evenly spaced on a logarithmic scale."""
     low_back: float | None = None
-    """Smallest α that is tried on the way back, where a quiet gait shows less; None: `low`."""
+    """Smallest α that is tried on the way back, where a quiet gait has lower values; None:
+    `low`."""
     unit: str = ""
     """Of α."""
     needs: tuple[str, ...] = ()
-    """Optional signals that it looks at."""
+    """Optional signals that it reads."""
     count: int = 100
-    """How many α are tried."""
+    """Number of α that are tried."""
     leaks: tuple[float, ...] = LEAKS
     """Leaks that are tried [counts a step]."""
     note: str = ""
-    """What it stands for, in a few words."""
+    """Short description."""
     statistic: Watched | None = None
-    """What says those values step by step; None: they come of whole recordings alone."""
+    """The statistic that computes the values step by step; None: they need whole recordings."""
 
     def alphas(self, way: Way) -> Float[np.ndarray, " A"]:
         """α that are tried on this way."""
@@ -51,13 +52,13 @@ class Candidate:
         return np.geomspace(low, self.high, self.count)
 
     def missing(self, recording: LabelledRun) -> tuple[str, ...]:
-        """Columns of a table that the recording's log lacks, and that it looks at."""
+        """Columns that it reads and the recording's log lacks."""
         absent = (name for name in self.needs if getattr(recording.sensed, name) is None)
         return tuple(column for name in absent for column in columns_of(name))
 
 
 def _watching(name: str, statistic: Watched, **changes: Any) -> Candidate | None:
-    """A candidate whose numbers are a statistic's, step by step; None: of no use on any ground."""
+    """The candidate of a statistic; None where the statistic is independent of the ground."""
     if statistic.search is None:
         return None
     return Candidate(
@@ -80,7 +81,7 @@ CANDIDATES = tuple(
     )
     if candidate is not None
 )
-"""The paper's algorithm, and every statistic of `shift.STATISTICS` that says what to try."""
+"""The paper's algorithm, and every statistic of `shift.STATISTICS` with a search range."""
 
 
 def candidates(names: Sequence[str]) -> tuple[Candidate, ...]:

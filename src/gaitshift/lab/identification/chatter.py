@@ -1,4 +1,4 @@
-"""Chatter: how often robots would have shifted, there and back, by two rules in turn."""
+"""Chatter: how often robots would shift to the rough gait and back, by two rules."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ from gaitshift.shift.statistics import Watched
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RecordedValues:
-    """A statistic whose numbers were known before, step by step: what it says forgets nothing."""
+    """A statistic that replays values computed before; a reset does not change them."""
 
     values: Float[np.ndarray, "T N M"]
     """Of all steps."""
@@ -34,13 +34,13 @@ class RecordedValues:
         return 0
 
     def step(self, state: int, sensed: Proprioception) -> tuple[int, Float[np.ndarray, "N M"]]:
-        """The next step, and what was known of this one."""
+        """The index of the next step, and the values of this one."""
         del sensed
         return state + 1, self.values[state]
 
 
 def shipped_rule(*, back: bool) -> Rule:
-    """The default graph's rule of the way there or back: it stands in for what is not judged."""
+    """The default graph's rule of the way there or back, used for the way that is not judged."""
     return ways(load_graph())[back].rule
 
 
@@ -64,9 +64,9 @@ def in_turn(rule: Rule, statistic: Watched, way: Way) -> GaitGraph:
 
 
 def shifts(recording: LabelledRun, graph: GaitGraph) -> Int[np.ndarray, " N"]:
-    """How often each robot would have shifted, there and back taken together.
+    """Number of shifts of each robot, there and back together.
 
-    All begin in the gait for flat ground. A robot that has fallen shifts no more.
+    All begin in the gait for flat ground. A robot that has fallen no longer shifts.
     """
     n = recording.robots
     state, count = graph.begin(n), np.zeros(n, dtype=np.int64)
@@ -78,7 +78,7 @@ def shifts(recording: LabelledRun, graph: GaitGraph) -> Int[np.ndarray, " N"]:
 
 
 def ever_fires(recording: LabelledRun, rule: Rule, values: Float[np.ndarray, "T N M"]) -> bool:
-    """Whether any robot fires a rule: where none does on the way there, none ever shifts."""
+    """Whether a rule fires for any robot; if not, no robot ever shifts."""
     alpha, beta = np.array([rule.alpha]), np.array([rule.beta])
     first = first_firings(values, recording.alive, rule, alpha, beta)
     return bool((first < len(recording.time)).any())
@@ -87,8 +87,8 @@ def ever_fires(recording: LabelledRun, rule: Rule, values: Float[np.ndarray, "T 
 def chattered(recording: LabelledRun, count: Int[np.ndarray, " N"]) -> Bool[np.ndarray, " N"]:
     """Whether each robot shifted more than once there and once back for each rough stretch.
 
-    Once there and once back is nobody's chatter, even where no ground was rough: it is a false
-    shift, and is told as such.
+    One shift there and one back never count as chatter, even without rough ground: they are
+    reported as false shifts.
     """
     rough = recording.rough & recording.alive
     begun = rough & ~np.roll(rough, 1, axis=0)

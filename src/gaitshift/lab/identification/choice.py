@@ -1,4 +1,4 @@
-"""The α, β and leak that a criterion chooses, and what other recordings say of them."""
+"""The choice of α, β and leak by a criterion on recordings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,34 +11,34 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.firings import ParameterGrid, Tally
 
 HEADROOM = 1.25
-"""No false shift on the recordings of the choice even at a β smaller by this factor; ours: what is
-chosen at the very edge fails on the next recordings."""
+"""The choice has no false shift even at a β smaller by this factor; ours: a setting without
+headroom has false shifts on other recordings."""
 
 ALPHA_HEADROOM = 1.05
-"""… and at an α by this factor further to where a rule fires more: smaller where it counts what is
-above α, larger where it counts what is below. All the headroom there is where β is 0; ours."""
+"""… and at an α changed by this factor so that the rule fires more often: smaller where it counts
+values above α, larger where it counts values below. The only headroom where β is 0; ours."""
 
 MISS_COSTS = 20.0
-"""A rough stretch that went by without a shift counts as a delay of this many metres; ours."""
+"""A rough stretch without a shift counts as a delay of this many metres; ours."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
-    """A point of the grid, and how it did on the recordings that chose it."""
+    """A point of the grid, and its figures on the recordings used for the choice."""
 
     alpha: float
     """α, in the statistic's unit."""
     beta: float
     """β [counts]."""
     leak: float
-    """What k loses in each step [counts]."""
+    """Decrease of k in each step [counts]."""
     cost_m: float = np.nan
-    """Mean delay with misses counted [m]: what was made small; NaN where the numbers were given."""
+    """The minimised cost: mean delay, misses included [m]; NaN where the numbers were given."""
     false_per_km: float = np.nan
-    """False shifts a kilometre of smooth ground at this α and β; NaN where they were given."""
+    """False shifts per kilometre of smooth ground at this α and β; NaN where they were given."""
     is_free: bool | None = None
-    """Whether no robot shifted on smooth ground, with headroom in β; else the fewest were taken.
-    None where the numbers were given."""
+    """Whether no robot shifted on smooth ground, with headroom; false: the setting with the fewest
+    false shifts. None where the numbers were given."""
 
 
 def choose(
@@ -46,18 +46,18 @@ def choose(
     grid: ParameterGrid,
     when: Literal["above", "below"] = "above",
 ) -> Choice:
-    """The soonest detection of rough ground among the settings that never shift on smooth ground.
+    """The setting with the earliest detection among those that never shift on smooth ground.
 
-    Where there is none, those with the fewest false shifts a kilometre are taken.
+    Where there is none, it is the earliest among those with the fewest false shifts per kilometre.
 
     Args:
         tallies: by leak, then by the name of the recordings.
-        grid: the α and β that they are about.
+        grid: the α and β of the tallies.
         when: what the rule counts; "below" is for the way back, on which rough and smooth ground
-            have changed their parts.
+            are exchanged.
 
     Raises:
-        GaitshiftError: no robot came to rough ground, or none walked on smooth ground.
+        GaitshiftError: no robot reached rough ground, or none walked on smooth ground.
     """
     choices = [_best(leak, _together(by_name), grid, when) for leak, by_name in tallies.items()]
     return min(choices, key=lambda c: (not c.is_free, 0 if c.is_free else c.false_per_km, c.cost_m))
@@ -101,14 +101,14 @@ def _together(by_name: Mapping[str, Tally]) -> Tally:
 
 
 def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
-    """Mean delay [m] over all that came to rough ground, a miss counting `MISS_COSTS`."""
+    """Mean delay [m] over all robots that reached rough ground; a miss counts `MISS_COSTS`."""
     missed = tally.came - tally.detected
     total = tally.metres + MISS_COSTS * missed
     return np.where(tally.came > 0, total / np.maximum(tally.came, 1), np.inf)
 
 
 def _free(tally: Tally, grid: ParameterGrid, when: Literal["above", "below"]) -> np.ndarray:
-    """Where nobody fired on smooth ground, nor at a β that much smaller and an α as much nearer."""
+    """Settings without firings on smooth ground, also after both factors of headroom."""
     clean = tally.fired == 0
     if when == "above":
         alpha = np.searchsorted(grid.alphas, grid.alphas / ALPHA_HEADROOM, "right") - 1

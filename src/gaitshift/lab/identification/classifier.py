@@ -1,4 +1,4 @@
-"""An upper bound: gradient boosting on windows of the same signals that conditions are fed with."""
+"""An upper bound: gradient boosting on windows of the signals of the conditions."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -39,34 +39,34 @@ _STATISTICS: tuple[AnyStatistic, ...] = (
     Slip(),
     CostOfTransport(window=0.5),
 )
-"""What it sees of a step: the largest number of each, now and over windows."""
+"""Its input at a step: the largest value of each, now and over windows."""
 
 _WINDOWS = (0.5, 2.0)
-"""Means over the last so many seconds are seen as well."""
+"""Lengths of the windows whose means are inputs too [s]."""
 
 _EVERY = 5
-"""It looks at each fifth step, and says the same in between."""
+"""It is evaluated at every fifth step; its output is constant in between."""
 
 _SEED = 0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RoughnessClassifier:
-    """Two models, of half of the robots each: one of them has never seen a robot."""
+    """Two models, each fitted on half of the robots, so that one has not seen a given robot."""
 
     statistics: tuple[AnyStatistic, ...]
-    """Those that the recordings feed."""
+    """Statistics whose signals the recordings have."""
     models: tuple[Any, Any]
-    """Of one half of the robots, and of the other."""
+    """One for each half of the robots."""
     halves: Mapping[int, int]
-    """Which of them learned from the first robot of each recording; they take turns from there."""
+    """Half of the first robot of each recording; the halves alternate from robot to robot."""
 
     @classmethod
     def fit(cls, recordings: Iterable[LabelledRun]) -> "RoughnessClassifier":
         """Learns rough from smooth ground.
 
         Raises:
-            GaitshiftError: the labels are of one kind alone.
+            GaitshiftError: all labels are the same.
         """
         features: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
         labels: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
@@ -79,10 +79,10 @@ class RoughnessClassifier:
             rough, alive = recording.rough[::_EVERY], recording.alive[::_EVERY]
             halves[_key(recording)] = count % 2
             for robot in range(recording.robots):
-                half, kept = count % 2, alive[:, robot]
+                half, standing = count % 2, alive[:, robot]
                 count += 1
-                features[half].append(seen[kept, robot])
-                labels[half].append(rough[kept, robot])
+                features[half].append(seen[standing, robot])
+                labels[half].append(rough[standing, robot])
         if not (features[0] and features[1]):
             raise GaitshiftError(
                 "a classifier needs two robots or more, or several passages of one"
@@ -94,14 +94,14 @@ class RoughnessClassifier:
         return cls(statistics=statistics, models=cast(Any, models), halves=halves)
 
     def probability(self, recording: LabelledRun, *, crosswise: bool) -> Float[np.ndarray, "T N 1"]:
-        """How likely the ground is rough, by both models, or by the one that never saw the robot.
+        """Probability of rough ground, by both models, or by the one that has not seen the robot.
 
-        `crosswise` is for the very recordings that it was fitted on.
+        `crosswise` selects the latter, for the recordings on which the models were fitted.
         """
         seen = _features(recording, self.statistics)
         steps, robots, width = seen.shape
         flat = seen.reshape(steps * robots, width)
-        with threadpool_limits(1):  # batches are small: threads would only wait for each other
+        with threadpool_limits(1):  # batches are too small for threads
             first, second = (_likely(model, flat).reshape(steps, robots) for model in self.models)
         likely = (first + second) / 2
         if crosswise:
@@ -110,7 +110,7 @@ class RoughnessClassifier:
         return np.repeat(likely, _EVERY, axis=0)[: len(recording.time), :, None]
 
     def candidate(self, *, crosswise: bool) -> Candidate:
-        """As a condition whose α is a probability."""
+        """The classifier as a condition whose α is a probability."""
         return Candidate(
             name=NAME,
             low=0.02,
@@ -135,7 +135,7 @@ def _key(recording: LabelledRun) -> int:
 def _features(
     recording: LabelledRun, statistics: tuple[AnyStatistic, ...]
 ) -> Float[np.ndarray, "S N F"]:
-    """What the classifier sees, at each fifth step; NaN where nothing is known yet."""
+    """Inputs of the classifier at every fifth step; NaN where nothing is known yet."""
     columns: list[np.ndarray] = []
     for statistic in statistics:
         values = recording.values(statistic)

@@ -12,7 +12,7 @@ from gaitshift.lab.identification.labelled_run import LabelledRun
 from gaitshift.shift import Rule
 
 _TOGETHER = 16
-"""Robots that a leaking counter is run for at once: some more take memory, fewer take time."""
+"""Robots for which a leaking counter runs at once: more need more memory, fewer more time."""
 
 
 def first_firings(
@@ -24,12 +24,12 @@ def first_firings(
 ) -> Int[np.ndarray, "N A B"]:
     """The step in which each robot first fires at each α and β; T where it never does.
 
-    ε, leak and side are the rule's; its own α, β and hold play no part. The counter goes through
-    the same sums as on a robot, so a replay fires in the very step in which the robot did. A robot
-    that has fallen fires no more.
+    ε, leak and side are those of the rule; its α, β and hold are not used. The counter adds in the
+    same order as on a robot, so a replay fires in the same step as the robot did. A robot that has
+    fallen no longer fires.
 
     Raises:
-        GaitshiftError: α or β are not rising.
+        GaitshiftError: α or β do not rise.
     """
     for name, grid in (("α", alphas), ("β", betas)):
         if len(grid) == 0 or np.any(np.diff(grid) <= 0.0):
@@ -71,7 +71,7 @@ def counts_at(
     if rule.when == "below":
         largest = values.max(axis=1)  # NaN where any is unknown
         return (largest < alphas[:, None]).astype(np.int64)
-    # A value is above as many of the rising α as are smaller than it.
+    # The number of α below a value is its place in the rising α.
     passed = np.searchsorted(alphas, np.where(np.isnan(values), -np.inf, values), "left")
     slot = passed * steps + np.arange(steps)[:, None]
     shape = (len(alphas) + 1, steps)
@@ -80,39 +80,39 @@ def counts_at(
 
 
 def steps_alive(alive: Bool[np.ndarray, "T N"]) -> Int[np.ndarray, " N"]:
-    """Steps before each robot fell."""
+    """Number of steps before each robot fell."""
     fell = ~alive
     return np.where(fell.any(axis=0), fell.argmax(axis=0), len(alive))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Detections:
-    """Of the robots that came to rough ground without having fired, at each α and β."""
+    """Detections of the robots that reached rough ground without a firing, at each α and β."""
 
     came: Int[np.ndarray, "A B"]
     """Robots."""
     detected: Int[np.ndarray, "A B"]
     """Those of them that fired before the rough ground, or their run, ended."""
     delay_s: Float[np.ndarray, "N A B"]
-    """From coming to it until firing [s]; NaN where not detected."""
+    """Time from the start of rough ground to the firing [s]; NaN where not detected."""
     delay_m: Float[np.ndarray, "N A B"]
-    """The same as a way [m]."""
+    """The same as a distance [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FalseShifts:
-    """Of robots on smooth ground, until they come to rough ground, at each α and β."""
+    """Firings of robots on smooth ground, before they reach rough ground, at each α and β."""
 
     fired: Int[np.ndarray, "A B"]
     """Robots that fired."""
     robots: int
     """Robots."""
     km: Float[np.ndarray, "A B"]
-    """Way that was walked until firing or to the end [km]."""
+    """Distance walked until the firing or the end [km]."""
 
 
 def detections(recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> Detections:
-    """How the firings `first` of one recording met its first stretch of rough ground."""
+    """The firings `first` of one recording on its first stretch of rough ground."""
     entry, end = _stretch(recording)
     came = (entry[:, None, None] < end[:, None, None]) & (first >= entry[:, None, None])
     detected = came & (first < end[:, None, None])
@@ -132,7 +132,7 @@ def detections(recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> Detec
 
 
 def false_shifts(recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> FalseShifts:
-    """The firings before any rough ground, and the way walked until then."""
+    """The firings before any rough ground, and the distance walked until then."""
     entry, _ = _stretch(recording)
     limit = np.minimum(entry, steps_alive(recording.alive))[:, None, None]
     fired = first < limit
@@ -144,7 +144,7 @@ def false_shifts(recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> Fal
 
 
 def _stretch(recording: LabelledRun) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " N"]]:
-    """Steps at which each robot comes to its first rough ground, and leaves it; T if never."""
+    """Steps at which each robot reaches its first rough ground, and leaves it; T if never."""
     steps = len(recording.time)
     rough = recording.rough & recording.alive
     some = rough.any(axis=0)
@@ -171,12 +171,12 @@ class ParameterGrid:
 
 @dataclass(kw_only=True, eq=False)
 class Tally:
-    """What came of a rule over many recordings."""
+    """Results of a rule over many recordings."""
 
     shape: tuple[int, int]
     """A, B."""
     came: Int[np.ndarray, "A B"] = field(init=False)
-    """Robots that came to rough ground without having fired."""
+    """Robots that reached rough ground without a firing."""
     detected: Int[np.ndarray, "A B"] = field(init=False)
     """Those of them that fired on it."""
     seconds: Float[np.ndarray, "A B"] = field(init=False)
@@ -186,7 +186,7 @@ class Tally:
     fired: Int[np.ndarray, "A B"] = field(init=False)
     """Robots that fired on smooth ground."""
     km: Float[np.ndarray, "A B"] = field(init=False)
-    """Way over smooth ground until firing, of all robots [km]."""
+    """Distance over smooth ground until the firing, of all robots [km]."""
     robots: int = 0
     """Robots in all."""
 
@@ -195,7 +195,7 @@ class Tally:
         self.seconds, self.metres, self.km = (np.zeros(self.shape) for _ in range(3))
 
     def add(self, recording: LabelledRun, first: Int[np.ndarray, "N A B"]) -> None:
-        """Takes in the firings of one recording."""
+        """Adds the firings of one recording."""
         found, wrong = detections(recording, first), false_shifts(recording, first)
         self.came += found.came
         self.detected += found.detected
@@ -206,13 +206,13 @@ class Tally:
         self.robots += wrong.robots
 
     def join(self, other: "Tally") -> None:
-        """Takes in all that another one has."""
+        """Adds the results of another tally."""
         for name in ("came", "detected", "seconds", "metres", "fired", "km", "robots"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
 
     @property
     def missed(self) -> Float[np.ndarray, "A B"]:
-        """Share of the rough stretches that went by without a shift; NaN where none was met."""
+        """Share of the rough stretches without a shift; NaN without a rough stretch."""
         return 1.0 - _share(self.detected, self.came)
 
     @property
@@ -227,16 +227,16 @@ class Tally:
 
     @property
     def false_per_km(self) -> Float[np.ndarray, "A B"]:
-        """Shifts on smooth ground a kilometre; NaN where none was walked."""
+        """Shifts per kilometre of smooth ground; NaN where none was walked."""
         return _share(self.fired, self.km)
 
 
 @runtime_checkable
 class Joining(Protocol):
-    """What came of some recordings, and takes in what came of others."""
+    """Results of some recordings, to which those of others can be added."""
 
     def join(self, other: Any, /) -> None:
-        """Takes in all that another one has."""
+        """Adds the results of another one."""
         ...
 
 
@@ -244,7 +244,7 @@ Part = TypeVar("Part", bound=Joining)
 
 
 def join_by_name(mine: dict[str, Part], others: Mapping[str, Part]) -> None:
-    """Takes in, for each name, all that the others have of it."""
+    """Joins the results of the others, name by name."""
     for name, other in others.items():
         if name in mine:
             mine[name].join(other)

@@ -1,4 +1,4 @@
-"""Which ground is rough, and a recording seen by what is to be noticed on it."""
+"""Labels of rough ground, and recordings aligned to the start of what is detected."""
 
 from dataclasses import replace
 
@@ -11,11 +11,11 @@ from gaitshift.lab.log import Log
 from gaitshift.sim.terrain import KINDS, sections_of
 
 _ROUGH_FROM = {kind.name: kind.rough_from for kind in KINDS if kind.rough_from is not None}
-"""Least number from which a kind of ground counts as rough; other kinds never do."""
+"""Least number at which a kind of ground counts as rough; other kinds never do."""
 
 
 def rough_ground(log: Log) -> Bool[np.ndarray, "T N"]:
-    """Whether each robot's base is over rough ground, by the pieces of the log's track.
+    """Whether each robot's base is over rough ground, from the pieces of the log's track.
 
     Raises:
         GaitshiftError: the name of the ground cannot be read.
@@ -27,7 +27,7 @@ def rough_ground(log: Log) -> Bool[np.ndarray, "T N"]:
 def is_rough(
     x: Float[np.ndarray, "*shape"], terrain: str, x0: float, length: float
 ) -> Bool[np.ndarray, "*shape"]:
-    """Whether the ground is rough at x [m]: a ground of this name from `x0`, `length` metres long.
+    """Whether a ground of this name, from `x0` on and `length` [m] long, is rough at x [m].
 
     Raises:
         GaitshiftError: the name cannot be read.
@@ -51,14 +51,14 @@ def is_rough(
 def align_to_entry(
     recording: LabelledRun, values: Float[np.ndarray, "T N M"], way: Way
 ) -> tuple[LabelledRun, Float[np.ndarray, "T N M"]]:
-    """The recording with what is to be noticed as its rough ground, and the values beside it.
+    """The recording with the ground to detect as its rough ground, and the values beside it.
 
-    Each robot begins where it first comes to the other ground: smooth, on the way to rough ground,
-    and rough, on the way back. What it walked on before that it has not come to, and a firing on it
-    would be no detection. What the statistic remembers is what it has seen by then. A robot that
-    never comes to the other ground counts from the start on the way to rough ground, since a log of
-    rough ground alone tells how soon it is noticed; on the way back it counts as fallen from the
-    start. Rows that are missing at the end are filled up with fallen robots.
+    Each robot starts where it first reaches the ground before the one to detect: smooth ground for
+    the way to rough ground, and rough ground for the way back. Steps before that are dropped,
+    because a firing there is not a detection; the statistic has seen them. A robot that never
+    reaches that ground counts from the start for the way to rough ground, since a log of rough
+    ground alone still shows the delay; for the way back it counts as fallen from the start. Rows
+    missing at the end are filled with fallen robots.
     """
     back = way == "flat"
     other = (recording.rough == back) & recording.alive

@@ -1,4 +1,4 @@
-"""What conditions with their numbers do on recordings that did not choose them."""
+"""Judges conditions with their numbers on recordings that were not used to choose them."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ from gaitshift.lab.identification.tuning import Tuned
 
 @dataclass(kw_only=True)
 class OnCourse:
-    """How one condition did on the recordings of one name."""
+    """Results of one condition on the recordings of one name."""
 
     course: str
     """Name of the recordings."""
@@ -39,14 +39,14 @@ class OnCourse:
     delays_m: list[float] = field(default_factory=list)
     """Of each detection [m]."""
     scores: dict[bool, list[int]] = field(default_factory=lambda: {True: [], False: []})
-    """Score of each passage (`passage_scores`), of what is to be noticed and of what is not."""
+    """Score of each passage (`passage_scores`), with (True) and without the ground to detect."""
     shifts: int = 0
-    """How often robots would have shifted, there and back (`chatter`)."""
+    """Number of shifts of all robots, there and back (`chatter`)."""
     chattered: int = 0
-    """Robots that did so more than once there and once back for each rough stretch."""
+    """Robots that shifted more than once there and once back for each rough stretch."""
 
     def join(self, other: "OnCourse") -> None:
-        """Takes in all that another one has."""
+        """Adds the results of another one."""
         self.tally.join(other.tally)
         self.delays_m += other.delays_m
         for is_wanted, scores in other.scores.items():
@@ -57,21 +57,21 @@ class OnCourse:
 
 @dataclass(kw_only=True)
 class Replayed:
-    """What conditions with their numbers did on some recordings; that of others may join it."""
+    """Results of conditions with their numbers on some recordings; others can be added."""
 
     courses: dict[str, dict[str, OnCourse]] = field(default_factory=dict)
     """By condition, by the name of the recordings."""
     soonest: dict[str, float] = field(default_factory=dict)
-    """What each one's β is in time [s]."""
+    """Shortest time to exceed each condition's β [s]."""
     scored: dict[str, bool] = field(default_factory=dict)
     """Whether a passage was long enough for each one's k to exceed `Tuned.area_beta`."""
     metres: float = 0.0
-    """Way that all robots have come [m],"""
+    """Distance walked by all robots [m]."""
     seconds: float = 0.0
-    """and the time that it took them [s]."""
+    """Time walked by all robots [s]."""
 
     def join(self, other: "Replayed") -> None:
-        """Takes in all that another one has."""
+        """Adds the results of another one."""
         for name, by_course in other.courses.items():
             join_by_name(self.courses.setdefault(name, {}), by_course)
         self.soonest |= other.soonest
@@ -83,24 +83,24 @@ class Replayed:
 
 @dataclass(frozen=True, kw_only=True)
 class Judged:
-    """A condition on recordings that did not choose its numbers."""
+    """Results of a condition on recordings that were not used to choose its numbers."""
 
     tuned: Tuned
     """The condition."""
     courses: tuple[OnCourse, ...]
     """Course by course."""
     soonest: float
-    """What β is in time [s]: from k = 0 to firing where every value counts in each step."""
+    """Shortest time to exceed β [s]: from k = 0 to firing where every value counts at each step."""
     speed: float
-    """Mean speed of the robots that judged [m/s]."""
+    """Mean speed of the robots in the recordings [m/s]."""
     is_scored: bool
-    """Whether k can exceed `Tuned.area_beta` within a passage: else its scores tell nothing."""
+    """Whether k can exceed `Tuned.area_beta` within a passage; else its scores mean nothing."""
 
     def area(self, course: str) -> tuple[float, float, float] | None:
-        """Area under the ROC curve of the passages to be noticed on a course, with its interval.
+        """Area under the ROC curve of a course's passages with the ground to detect, with interval.
 
-        Against the passages of all recordings on which nothing is to be noticed; None without both,
-        and where no passage is long enough for the rule to fire at all.
+        Negatives are the passages of all recordings without that ground. None without passages of
+        both kinds, and where no passage is long enough for the rule to fire.
         """
         wanted, others = self.scores_on(course), self.other_scores
         if not self.is_scored or not wanted.size or not others.size:
@@ -110,13 +110,13 @@ class Judged:
         return area, low, high
 
     def scores_on(self, course: str) -> Float[np.ndarray, " P"]:
-        """Scores of the passages to be noticed on a course."""
+        """Scores of the passages with the ground to detect on a course."""
         of = [c.scores[True] for c in self.courses if c.course == course]
         return np.array([float(score) for scores in of for score in scores])
 
     @property
     def other_scores(self) -> Float[np.ndarray, " Q"]:
-        """Scores of the passages in which nothing is to be noticed."""
+        """Scores of the passages without the ground to detect."""
         return np.array([float(x) for course in self.courses for x in course.scores[False]])
 
 
@@ -158,7 +158,7 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[LabelledRun]) -> R
 
 
 def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
-    """Each condition with what came of it.
+    """Each condition with its results.
 
     Raises:
         GaitshiftError: there was no recording.
@@ -180,7 +180,7 @@ def judge(tuned: Sequence[Tuned], replayed: Replayed) -> list[Judged]:
 def _add(
     course: OnCourse, one: Tuned, seen: LabelledRun, values: Float[np.ndarray, "T N M"]
 ) -> None:
-    """Adds what a condition did on a recording from `align_to_entry`."""
+    """Adds the results of a condition on a recording from `align_to_entry`."""
     alpha, beta = np.array([one.choice.alpha]), np.array([one.choice.beta])
     first = first_firings(values, seen.alive, one.rule, alpha, beta)
     course.tally.add(seen, first)

@@ -1,4 +1,4 @@
-"""What identification reads: what robots sensed over a run, and where the ground was rough."""
+"""The input of identification: proprioception over a run, and where the ground was rough."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,23 +12,23 @@ from gaitshift.robot.state import Proprioception
 from gaitshift.shift.statistics import Watched, watch
 
 Way = Literal["rough", "flat"]
-"""What is to be noticed: rough ground ahead, or, on the way back, that it has ended."""
+"""What a condition detects: the start of rough ground, or, on the way back, its end."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LabelledRun:
-    """T steps of N robots, and the truth that conditions are judged by."""
+    """T steps of N robots, and the true labels by which conditions are judged."""
 
     name: str
     """Of the file, or of the course."""
     sensed: Proprioception
-    """All that conditions are fed with (T, N, …)."""
+    """Input of the conditions (T, N, …)."""
     rough: Bool[np.ndarray, "T N"]
     """Whether the ground under the robot is rough: the truth."""
     alive: Bool[np.ndarray, "T N"]
-    """Whether the robot is on its feet; what comes after a fall does not count."""
+    """Whether the robot is on its feet; steps after a fall do not count."""
     distance: Float[np.ndarray, "T N"]
-    """Way that each robot has come since the start [m]."""
+    """Distance that each robot has walked since the start [m]."""
 
     @property
     def time(self) -> Float[np.ndarray, " T"]:
@@ -47,11 +47,11 @@ class LabelledRun:
         return self.rough.shape[1]
 
     def __iter__(self) -> Iterator[Proprioception]:
-        """What robots sensed, step by step, as they would have had it."""
+        """Proprioception step by step, as on the robots."""
         return (self.sensed[t] for t in range(len(self.rough)))
 
     def values(self, statistic: Watched) -> Float[np.ndarray, "T N M"]:
-        """A statistic's numbers: by the very code that runs on a robot, step by step."""
+        """A statistic's values, computed step by step with the code that runs on a robot."""
         memory = statistic.start(self.robots)
         values = np.empty((len(self.rough), self.robots, statistic.width))
         for t, sensed in enumerate(self):
@@ -60,7 +60,7 @@ class LabelledRun:
 
     @classmethod
     def from_log(cls, log: Log, name: str, rough: Bool[np.ndarray, "T N"]) -> "LabelledRun":
-        """One of our logs, with its labels."""
+        """A log of this package, with its labels."""
         place = log.truth.base_position_w[..., :2].astype(float)
         step = np.diff(place, axis=0, prepend=place[:1])
         return cls(

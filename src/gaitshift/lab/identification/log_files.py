@@ -22,10 +22,10 @@ _AXES = ("x", "y", "z")
 CONTACTS = tuple(f"contact_{leg}" for leg in LEGS)
 FEET = tuple(f"foot_{leg}_{axis}" for leg in LEGS for axis in _AXES)
 REQUIRED = ("time", *CONTACTS, *FEET, "rough")
-"""Columns that every log has: s, 0 or 1, m in the body frame, and 0 or 1."""
+"""Columns of every log: time [s], contacts (0 or 1), feet in the body frame [m], rough (0 or 1)."""
 
 ATTITUDES = (tuple(f"gravity_{axis}" for axis in _AXES), ("roll", "pitch"))
-"""One of them is needed: the direction of gravity in the body frame, or two angles [rad]."""
+"""One of them is required: the direction of gravity in the body frame, or two angles [rad]."""
 
 VECTORS = {"velocity_b": "velocity", "angular_velocity_b": "angular_velocity"}
 """Optional signals of three columns: `velocity_x` and so on, body frame [m/s], [rad/s]."""
@@ -35,16 +35,16 @@ SCALARS = {
     "stride_frequency_command": "stride_frequency",
     "value": "value",
 }
-"""Optional signals of one column each [m/s], [Hz]; there is `yaw` [rad] beside them."""
+"""Optional signals of one column each [m/s], [Hz]; `yaw` [rad] is optional too."""
 
 _JOINTS = ("joint_position", "joint_velocity", "joint_torque")
 """Optional signals of twelve columns: `joint_torque_FL_HAA` and so on [rad], [rad/s], [N·m]."""
 
 LONGEST = 60_000
-"""Rows of a passage; a longer stretch is cut."""
+"""Largest number of rows of a passage; a longer stretch is cut."""
 
 _LEAST_GRAVITY = 1e-6
-"""Length below which a vector of gravity has no direction, in whatever unit it is."""
+"""Length below which a gravity vector has no direction, in any unit."""
 
 _NUMBERS = (
     "time",
@@ -62,7 +62,7 @@ _SEED = re.compile(r"-\d+$")
 
 
 def columns_of(signal: str) -> tuple[str, ...]:
-    """Columns that an optional signal is read from."""
+    """Columns of an optional signal."""
     if signal in VECTORS:
         return tuple(f"{VECTORS[signal]}_{axis}" for axis in _AXES)
     if signal in _JOINTS:
@@ -71,7 +71,7 @@ def columns_of(signal: str) -> tuple[str, ...]:
 
 
 def check_sources(paths: Sequence[Path]) -> None:
-    """`GaitshiftError` unless all are files of a kind that can be read: asked before any work."""
+    """`GaitshiftError` unless all files have a readable format; called before any work."""
     for path in paths:
         if not path.is_file():
             raise GaitshiftError(f"no log file {path}")
@@ -82,12 +82,12 @@ def check_sources(paths: Sequence[Path]) -> None:
 
 
 def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[LabelledRun]:
-    """What the files hold, one after the other, tables passage by passage for this way.
+    """The recordings in the files, file by file; tables are split into passages for this way.
 
-    A recording has the name of its file, less a seed at its end.
+    A recording has the name of its file without a seed at its end.
 
     Raises:
-        GaitshiftError: a file cannot be read, with what is wrong in it.
+        GaitshiftError: a file cannot be read; the message says why.
     """
     for path in paths:
         if path.suffix in STREAMED:
@@ -102,14 +102,14 @@ def recordings(paths: Sequence[Path], way: Way = "rough") -> Iterator[LabelledRu
 
 
 def passages(path: Path, way: Way = "rough") -> Iterator[LabelledRun]:
-    """The passages of a log: smooth ground up to where it ends, and the rough ground behind it.
+    """The passages of a log: each is smooth ground followed by rough ground.
 
-    On the way to flat ground it is rough ground, and the smooth ground behind it. Rough ground that
-    a log begins on was not come to, and is left out where smooth ground follows. A file is read
-    batch by batch, so that gigabytes need no more memory than a passage.
+    On the way back each is rough ground followed by smooth ground. Rough ground at the start of a
+    log is left out if smooth ground follows, because its beginning is not in the log. A file is
+    read in batches, so that gigabytes need no more memory than a passage.
 
     Raises:
-        GaitshiftError: what the file lacks or has wrong, with the row where there is one.
+        GaitshiftError: the file lacks a column or has a wrong value, with its row.
     """
     columns: dict[str, list[np.ndarray]] = {}
     rows, before, period, touched, down = 0, np.nan, np.nan, False, 0.0
@@ -163,7 +163,7 @@ def _check_columns(path: Path, batch: dict[str, np.ndarray]) -> None:
 def _check_values(
     path: Path, batch: dict[str, np.ndarray], rows: int, before: float, period: float
 ) -> float:
-    """Refuses what is not a number or not in step; the time between two rows [s]."""
+    """Raises `GaitshiftError` for NaN or uneven times; returns the time between two rows [s]."""
     for name, values in batch.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if bad.size:
@@ -195,7 +195,7 @@ def _check_values(
 
 
 def _down(path: Path, batch: dict[str, np.ndarray], rows: int, before: float) -> float:
-    """Sum of the vertical parts of gravity in a batch; `before` is that of the rows before it.
+    """Sum of the vertical components of gravity so far; `before` is the sum of the rows before.
 
     Raises:
         GaitshiftError: gravity has no direction in a row, or points up on average.
@@ -221,7 +221,7 @@ def _down(path: Path, batch: dict[str, np.ndarray], rows: int, before: float) ->
 
 
 def _ends(rough: np.ndarray) -> list[int]:
-    """Where rough ground ends, and where a stretch has become too long."""
+    """Rows where rough ground ends, or where a stretch is too long."""
     ends = [int(last) + 1 for last in np.flatnonzero(rough[:-1] & ~rough[1:])]
     start, cuts = 0, list[int]()
     for end in [*ends, len(rough)]:
@@ -259,7 +259,7 @@ def _recording(path: Path, columns: dict[str, np.ndarray], rows: slice) -> Label
 
 
 def _gravity(columns: dict[str, np.ndarray]) -> Float[np.ndarray, "T 3"]:
-    """Direction of gravity in the body frame, as it stands or by roll and pitch."""
+    """Direction of gravity in the body frame, from its columns or from roll and pitch."""
     vector, angles = ATTITUDES
     if all(name in columns for name in vector):
         gravity = np.stack([columns[name] for name in vector], axis=1)
@@ -270,7 +270,7 @@ def _gravity(columns: dict[str, np.ndarray]) -> Float[np.ndarray, "T 3"]:
 
 
 def _distance(sensed: Proprioception) -> Float[np.ndarray, "T 1"]:
-    """The way that one robot has come, by leg odometry [m]."""
+    """Distance that one robot has walked, by leg odometry [m]."""
     odometry, steps = LegOdometry(), len(sensed.contact)
     state, base = odometry.start(1), np.empty((steps, 2))
     for t in range(steps):

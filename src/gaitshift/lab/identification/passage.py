@@ -1,4 +1,4 @@
-"""Recordings cut into passages of one length: what ROC curves are made of."""
+"""Recordings cut into passages of one length, for ROC curves."""
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
@@ -12,7 +12,7 @@ from gaitshift.lab.identification.statistics import auc
 from gaitshift.shift import Rule
 
 LENGTH = 3.0
-"""Of a passage [m]; ours: twice what a condition may take to notice noise of 0.10 m."""
+"""Length of a passage [m]; ours: twice the accepted delay on noise of 0.10 m."""
 
 GridScores = dict[bool, list[Int[np.ndarray, " B"]]]
 """Scores of passages at each β of a grid, by whether their ground is rough."""
@@ -24,10 +24,10 @@ def passage_scores(
     rule: Rule,
     alphas: Float[np.ndarray, " A"],
 ) -> dict[bool, list[int]]:
-    """At how many of the α the rule fires in each passage, by whether its ground is rough.
+    """Number of α at which the rule fires in each passage, by whether its ground is rough.
 
-    Each passage of `LENGTH` begins with k = 0: where a robot starts, where the ground changes, or
-    where the last one ended; what is left over at the end is no passage. β and leak are the rule's.
+    Each passage of `LENGTH` begins with k = 0 where a robot starts, where the ground changes, or
+    where the last passage ended; a shorter rest is dropped. β and leak are the rule's.
     """
     scores = passage_grid(recording, values, rule, alphas, np.array([rule.beta]))
     return {rough: [int(of[0]) for of in rows] for rough, rows in scores.items()}
@@ -56,12 +56,12 @@ def best_beta(
 ) -> float:
     """The β with the largest area under the ROC curve, as a mean over the courses.
 
-    The chosen one, if none is better or there are no passages of both kinds.
+    It is `chosen` if none is better or there are no passages of both kinds.
 
     Args:
-        scores: by the name of the course; those of smooth ground are taken together.
-        betas: the grid that they are about.
-        chosen: one of the grid.
+        scores: by the name of the course; those of smooth ground are pooled.
+        betas: the grid of the scores.
+        chosen: the chosen β of the grid.
     """
     others = [row for course in scores.values() for row in course[False]]
     met = [np.stack(course[True]) for course in scores.values() if course[True]]

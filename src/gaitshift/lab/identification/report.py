@@ -64,7 +64,7 @@ def hardest_first(judged: Sequence[Judged]) -> list[str]:
 
 
 def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
-    """Heading of a report, and how its numbers were chosen and judged."""
+    """Heading of a report, what it shows, and how its numbers were chosen and judged."""
     tuned = judged[0].tuned
     who = (
         "The settings were chosen on some logs and judged on others."
@@ -78,10 +78,13 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
         "shortest delay among those without a false shift, also with a β smaller by a fifth. "
         f"{who}"
     )
+    place = "on rough ground" if tuned.way == "rough" else "after the end of rough ground"
     stand_in = shipped_rule(back=tuned.way == "rough")
     other = "back" if tuned.way == "rough" else "there"
     return _TITLES[tuned.way], (
-        f"{how} A control step is {1000 * CONTROL_PERIOD:g} ms unless a log has another. β [s] and "
+        f"The tables show how far robots walk {place} until each condition detects it, and how "
+        f"often the condition shifts without need. {how} "
+        f"A control step is {1000 * CONTROL_PERIOD:g} ms unless a log has another. β [s] and "
         "β [m] are the shortest time until k exceeds β, with all values beyond α, and the distance "
         f"at the mean speed. Area is that under the ROC curve of passages of {LENGTH:g} m on the "
         f"hardest course, at {_area_words(tuned.choice)}. Chattered counts the robots with more "

@@ -1,4 +1,4 @@
-"""Intervals and areas: what a number of trials lets one say."""
+"""Confidence intervals, and areas under ROC curves."""
 
 import numpy as np
 from jaxtyping import Float
@@ -38,7 +38,7 @@ def poisson(
 def auc(
     rough: Float[np.ndarray, "P ..."], smooth: Float[np.ndarray, "Q ..."]
 ) -> Float[np.ndarray, "..."]:
-    """Probability that a score of rough ground is above one of smooth; a tie counts half.
+    """Probability that a score of rough ground exceeds one of smooth ground; a tie counts half.
 
     The area under the ROC curve, by ranks (Mann and Whitney 1947), along axis 0.
     """
@@ -48,9 +48,9 @@ def auc(
 
 
 def auc_interval(area: float, positives: int, negatives: int) -> tuple[float, float]:
-    """Interval of an area under the ROC curve: Wilson's, as if of the smaller number of trials.
+    """Interval of an area under the ROC curve: Wilson's, with the smaller number of trials.
 
-    On the safe side, and not without width where the area is 1.
+    It is conservative, and has a width above 0 where the area is 1.
     """
     trials = np.array([float(min(positives, negatives))])
     low, high = wilson(area * trials, trials)

@@ -1,4 +1,4 @@
-"""What was found out is kept, so that a run that was killed goes on where it stopped."""
+"""A cache of the results of steps, so that a killed run resumes where it stopped."""
 
 import hashlib
 from collections.abc import Callable, Sequence
@@ -9,7 +9,7 @@ from typing import Any, TypeVar, cast
 from joblib import Memory
 
 PACKAGE = Path(__file__).parents[2]
-"""What is kept depends on all code in here."""
+"""Folder of the code on which cached results depend."""
 
 Found = TypeVar("Found")
 Stamp = tuple[str, int, int]
@@ -18,28 +18,28 @@ Stamp = tuple[str, int, int]
 class StepCache:
     """Steps of a task, each done once, even if the process ends in between.
 
-    A step is done anew where what it depends on, or the code of this package, has changed.
+    A step is repeated if its inputs or the code of this package have changed.
     """
 
     def __init__(self, folder: Path, report: Callable[[str], None]) -> None:
-        """Keeps it in `folder`; `report` is told the name of each step."""
+        """Caches results in `folder`; `report` is called with the name of each step."""
         self._folder = folder
         self._code = _code()
         self._report = report
 
     @cached_property
     def _step(self) -> Any:
-        """Made late: whoever is refused before the first step finds no new folder."""
+        """Created at the first step, so that an error before it leaves no new folder."""
         memory = cast(Any, Memory)(self._folder, verbose=0, compress=1)
         return memory.cache(_do, ignore=["work"])
 
     def get(self, name: str, depends_on: Sequence[Any], work: Callable[[], Found]) -> Found:
-        """What the work of a step gives, or gave before.
+        """The result of a step, from the cache if it is there.
 
         Args:
-            name: told to `report`.
-            depends_on: names, numbers and stamps of files; all that decides what the work gives.
-            work: does it.
+            name: passed to `report`.
+            depends_on: names, numbers and stamps of files: all inputs of the step.
+            work: computes the result.
         """
         key = (self._code, name, *depends_on)
         known = self._step.check_call_in_cache(work, key)
@@ -48,7 +48,7 @@ class StepCache:
 
 
 def stamp(path: Path) -> Stamp:
-    """What tells a file from another one, and from an earlier one of its name."""
+    """A stamp that differs between files, and between versions of a file."""
     status = path.stat()
     return str(path.resolve()), status.st_size, status.st_mtime_ns
 
@@ -59,8 +59,8 @@ def _do(work: Callable[[], Any], key: tuple[Any, ...]) -> Any:
 
 
 def _code() -> str:
-    """Fingerprint of this package: what other code found out is not known to this one."""
-    told = hashlib.sha256()
+    """Fingerprint of this package's code: results of other code are not reused."""
+    fingerprint = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*.py")):
-        told.update(path.read_bytes())
-    return told.hexdigest()
+        fingerprint.update(path.read_bytes())
+    return fingerprint.hexdigest()

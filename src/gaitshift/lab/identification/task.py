@@ -20,7 +20,7 @@ ALL = "all"
 
 @dataclass(frozen=True)
 class Numbers:
-    """α, β and leak that are to be judged, and not chosen."""
+    """Given α, β and leak, which are judged and not chosen."""
 
     alpha: float
     """In the condition's unit."""
@@ -32,18 +32,18 @@ class Numbers:
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What is asked for."""
+    """An identification: logs, conditions, and what they detect."""
 
     logs: tuple[Path, ...]
-    """Logs that choose the numbers."""
+    """Logs for choosing the numbers."""
     held_out: tuple[Path, ...] = ()
-    """Logs that judge them; without them the same ones do."""
+    """Logs for judging the numbers; by default the logs for choosing them."""
     conditions: tuple[str, ...]
-    """Their names, or `ALL`."""
+    """Names of the conditions, or `ALL`."""
     way: Way = "rough"
-    """What is to be noticed."""
+    """What the conditions detect."""
     numbers: Numbers | None = None
-    """None: they are chosen."""
+    """Numbers to judge; None: they are chosen."""
 
     def __post_init__(self) -> None:
         if self.everything and self.numbers is not None:
@@ -62,7 +62,7 @@ class Task:
 
     @property
     def everything(self) -> bool:
-        """Whether all conditions are asked for."""
+        """Whether all conditions are compared."""
         return ALL in self.conditions
 
     @property
@@ -73,11 +73,11 @@ class Task:
 
     @property
     def judges(self) -> tuple[Path, ...]:
-        """Logs that judge."""
+        """Logs for judging."""
         return self.held_out or self.logs
 
     def run(self, folder: Path, report: Callable[[str], None]) -> list[Judged]:
-        """Tunes and judges, log by log; what is found out is kept in `folder`, and known again.
+        """Tunes and judges, log by log; results are cached in `folder` and reused.
 
         Raises:
             GaitshiftError: a log cannot be read, lacks the signals of a condition that was named,
@@ -103,7 +103,7 @@ class Task:
     def _fitted(
         self, cache: StepCache, learned: tuple[Stamp, ...], report: Callable[[str], None]
     ) -> RoughnessClassifier | None:
-        """The classifier, where it is asked for and can learn."""
+        """The classifier, where it is compared and can learn."""
         if not self.everything and NAME not in self.conditions:
             return None
         work = partial(_fit, self.logs, self.way)

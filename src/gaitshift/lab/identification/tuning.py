@@ -1,4 +1,4 @@
-"""The numbers that recordings choose: every α, β and leak of each candidate, tried on them."""
+"""Tunes conditions: every α, β and leak of each candidate is tried on recordings."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,17 +20,17 @@ class Tuned:
     candidate: Candidate
     """The condition."""
     way: Way
-    """What it is to notice."""
+    """What it detects."""
     choice: Choice
     """α, β and leak."""
     grid: ParameterGrid
-    """What was tried."""
+    """α and β that were tried."""
     tally: Tally
-    """What came of it over the recordings that chose, at the chosen leak."""
+    """Results at the chosen leak on the recordings for choosing."""
     area_beta: float
-    """β at which passages are scored for ROC curves [counts]: of the grid's the one of the largest
-    mean area on the recordings that chose, as k may not reach the chosen β within a passage; where
-    numbers were given, the one that was given."""
+    """β at which passages are scored for ROC curves [counts]: that of the grid with the largest
+    mean area on the recordings for choosing, because k may not reach the chosen β within a passage.
+    Where numbers were given, the given β."""
 
     @property
     def rule(self) -> Rule:
@@ -45,7 +45,7 @@ class Tuned:
 
 @dataclass(kw_only=True)
 class OnGrid:
-    """What came of a candidate at one leak, at each α and β, on the recordings of one name."""
+    """Results of a candidate at one leak, at each α and β, on the recordings of one name."""
 
     tally: Tally
     """Detections and false shifts."""
@@ -53,7 +53,7 @@ class OnGrid:
     """Of each passage."""
 
     def join(self, other: "OnGrid") -> None:
-        """Takes in all that another one has."""
+        """Adds the results of another one."""
         self.tally.join(other.tally)
         for is_wanted, rows in other.scores.items():
             self.scores[is_wanted] += rows
@@ -61,23 +61,23 @@ class OnGrid:
 
 @dataclass(kw_only=True)
 class Tried:
-    """What came of whole grids on some recordings; that of others may join it."""
+    """Results of whole grids on some recordings; others can be added."""
 
     way: Way
-    """What was to be noticed."""
+    """What is detected."""
     found: dict[str, dict[float, dict[str, OnGrid]]] = field(default_factory=dict)
     """By candidate, by leak, by the name of the recordings."""
     lacking: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    """What a recording lacked, by the candidates that it did not feed."""
+    """Columns that a recording lacks, by candidate."""
 
     def on(self, candidate: Candidate, leak: float, course: str) -> OnGrid:
-        """Where to count what comes of a candidate; made where there is none."""
+        """The results of a candidate at one leak and course; empty results where there are none."""
         by_leak = self.found.setdefault(candidate.name, {})
         tally = Tally(shape=_grid(candidate, self.way).shape)
         return by_leak.setdefault(leak, {}).setdefault(course, OnGrid(tally=tally))
 
     def join(self, other: "Tried") -> None:
-        """Takes in all that another one has."""
+        """Adds the results of another one."""
         self.lacking |= other.lacking
         for name, by_leak in other.found.items():
             for leak, by_course in by_leak.items():
@@ -87,14 +87,14 @@ class Tried:
 def try_grids(
     candidates: Sequence[Candidate], recordings: Iterable[LabelledRun], way: Way
 ) -> Tried:
-    """Replays each candidate that a recording feeds, at each α, β and leak that it is tried at."""
+    """Replays each candidate whose signals a recording has, at each of its α, β and leaks."""
     tried = Tried(way=way)
     for recording in recordings:
         for candidate in candidates:
             if missing := candidate.missing(recording):
                 tried.lacking[candidate.name] = missing
                 continue
-            values = candidate.values(recording)  # an oracle sees the ground as it is
+            values = candidate.values(recording)  # before the labels change: an oracle reads them
             seen, values = align_to_entry(recording, values, way)
             grid = _grid(candidate, way)
             for leak in candidate.leaks:
@@ -109,9 +109,9 @@ def try_grids(
 
 
 def tune(candidates: Sequence[Candidate], tried: Tried) -> list[Tuned]:
-    """The numbers of each candidate that the recordings choose.
+    """The best numbers of each candidate on the recordings.
 
-    Candidates that no recording feeds are left out.
+    Candidates whose signals no recording has are left out.
 
     Raises:
         GaitshiftError: no rough ground, or no smooth ground, in the recordings.
@@ -154,10 +154,10 @@ def tune(candidates: Sequence[Candidate], tried: Tried) -> list[Tuned]:
 def as_given(
     candidates: Sequence[Candidate], *, way: Way, alpha: float, beta: float, leak: float = 0.0
 ) -> list[Tuned]:
-    """Each candidate with the same numbers, which nobody chose: to see what they do.
+    """Each candidate with the same given numbers, in place of chosen ones.
 
     Raises:
-        GaitshiftError: a number out of range.
+        GaitshiftError: a number is out of range.
     """
     _ = _rule(way, alpha, beta, leak)
     grids = [_grid(candidate, way) for candidate in candidates]

@@ -1,4 +1,4 @@
-"""What the paper says, what was measured, and whether it holds: a row a statement."""
+"""The paper's statements, the measured results, and whether they agree."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -21,31 +21,31 @@ from gaitshift.lab.reproduction.results import Results, Seeds
 Verdict = Literal["holds", "holds in part", "does not hold"]
 
 START_WITHIN, PLATEAU_WITHIN, CROSSING_WITHIN = 10.0, 5.0, 2.0
-"""How near to the paper's curves counts as the same: rewards a step, and a factor on iterations."""
+"""Tolerances of the paper's curves: two in reward per step, and a factor on iterations."""
 
 MOST_CHANGES = 12.0
-"""Changes of state a second beyond which feet vibrate and do not walk; ours: a stride of 6 Hz."""
+"""Changes of state per second above which feet vibrate and do not walk; ours: a stride of 6 Hz."""
 
 LATER = 1.1
-"""Factor on the iteration from which robots walk that counts as later."""
+"""A run learns later if it walks from an iteration larger by this factor."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One statement of the paper, held against the runs."""
+    """One statement of the paper, compared with the runs."""
 
     name: str
     """Its topic."""
     paper: str
-    """What the paper says, in our words, and where."""
+    """The statement in our words, and its place in the paper."""
     measured: str
-    """What the runs say."""
+    """Result of the runs."""
     verdict: Verdict
-    """Whether it holds."""
+    """Whether the statement holds."""
 
 
 def findings(results: Results) -> list[Finding]:
-    """Every statement that the runs at hand can speak of."""
+    """A finding for every statement that the finished runs can test."""
     gaits = dict(results.gaits())
     found: list[Finding] = []
     if len(gaits) == len(GAITS):
@@ -205,12 +205,12 @@ _COMPARISONS = {
     ),
     "gains": ("Joint gains are Kp = 3 and Kd = 0.2 (IV-A).", "paper-gains", _works_as_printed),
 }
-"""Of each group: the statement, the setting that decides on it, and the judge of the reference and
-that setting."""
+"""For each group: the statement, the setting that tests it, and a function that compares the
+reference with that setting."""
 
 
 def _describe(label: str, seeds: Seeds) -> str:
-    """How many walk, how many are as fast in any gait, and from when, by the median."""
+    """Number of runs that walk, number as fast in any gait, and the median first iterations."""
     text = (
         f"**{label}** {seeds.walking} of {len(seeds)} walk "
         f"({_median(seeds.walk_from)}), {seeds.moving} reach that speed in any gait "

@@ -25,18 +25,18 @@ FIGURES = (
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedPolicy:
-    """One policy, and how it walked."""
+    """The figures of one policy."""
 
     gait: str
-    """Which gait it is of."""
+    """Its gait."""
     seed: int
     """Seed of its training."""
     walks_at: int | None
     """Iteration of its training from which it walked."""
     figures: Mapping[str, float | None]
-    """`FIGURES` by name; None where a robot fell at once."""
+    """`FIGURES` by name; None where all robots fell at once."""
     log: Log | None
-    """The walk itself; None of a policy that an earlier report judged."""
+    """Log of the walk; None for a policy that an earlier report judged."""
 
 
 def judge(
@@ -45,7 +45,7 @@ def judge(
     earlier: EarlierRuns,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[JudgedPolicy]:
-    """Evaluates the policies of the paper's setting on flat ground, less those of earlier runs."""
+    """Evaluates the policies of the paper's setting on flat ground, except those judged earlier."""
     wanted = list(_policies(results))
     judged: list[JudgedPolicy] = []
     plan = results.plan
@@ -65,7 +65,7 @@ def judge(
 
 
 def middle(judged: list[JudgedPolicy], gait: str) -> JudgedPolicy | None:
-    """The policy of a gait that shows its pattern neither most nor least."""
+    """The policy of a gait with the median pattern fraction."""
     ordered = sorted(
         (one for one in judged if one.gait == gait),
         key=lambda one: one.figures["pattern_fraction"] or 0.0,
@@ -81,7 +81,7 @@ def _policies(results: Results) -> Iterator[tuple[str, int, int | None, str]]:
 
 
 def _one(value: float | list[float] | None) -> float | None:
-    """The figure, or its mean over the feet; None where there was nothing to measure."""
+    """The figure, or its mean over the feet; None for nothing to measure."""
     if value is None:
         return None
     number = fmean(value) if isinstance(value, list) else float(value)

@@ -117,7 +117,7 @@ LEARNED_BY = 100
 
 
 ABLATED = "trot"
-"""The gait that ablations are made with: the one that the paper learns first."""
+"""The gait of the ablations: the one that the paper learns first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,9 +129,9 @@ class Job:
     gait: str
     """Which gait."""
     seed: int
-    """Of networks, exploration and starts."""
+    """Seed of networks, exploration and starts."""
     recipe: Recipe
-    """The setting's recipe, cut to the plan's measure."""
+    """The setting's recipe with the plan's number of iterations."""
 
     @property
     def name(self) -> str:
@@ -146,7 +146,7 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """All runs, and the measure they are taken by."""
+    """All runs and their sizes."""
 
     seed: int = 0
     """First seed; the others follow it."""
@@ -155,14 +155,14 @@ class Plan:
     ablation_seeds: int = 3
     """Seeds of each ablation."""
     ablation_iterations: int = 200
-    """Iterations of each ablation, and of the reference where it is held against one; ours: twice
-    what the paper takes to learn a gait, so that all runs fit into an evening."""
+    """Iterations of each ablation, and of the reference when compared with one; ours: twice what
+    the paper needs to learn a gait, so that all runs take a few hours."""
     robots: int = 16
     """Robots that a trained policy of the paper's setting is judged on."""
     seconds: float = 10.0
     """Time that they walk [s]."""
     quick: bool = False
-    """Tiny runs that learn nothing: they show that everything works."""
+    """Tiny runs that learn nothing, as a test of the program."""
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -199,7 +199,7 @@ class Plan:
     def select(self, only: tuple[str, ...]) -> tuple[Job, ...]:
         """The runs of these gaits (in the paper's setting), settings or groups; all if none.
 
-        With an ablation come the runs of the reference that it is held against.
+        With an ablation the runs of its reference are included.
         """
         groups = {setting.name: setting.group for setting in ABLATIONS}
         known = (PAPER, *GAITS, *dict.fromkeys(groups.values()), *groups)

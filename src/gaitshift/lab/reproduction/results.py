@@ -1,4 +1,4 @@
-"""The runs of a plan that are over, in their folders or in the tables of an earlier report."""
+"""The finished runs of a plan, in their folders or in the tables of an earlier report."""
 
 import hashlib
 import json
@@ -24,28 +24,28 @@ from gaitshift.learn.run import PROGRESS
 RUNS_FILE, CURVES_FILE, GAITS_FILE = "runs.csv", "curves.csv", "gaits.csv"
 
 KEY = ("setting", "gait", "seed")
-"""What tells the runs of a plan apart, the first columns of each of the tables."""
+"""The key of a run of a plan: the first columns of each table."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EarlierRuns:
-    """Runs that are over, by the name of their job; their folders may be gone."""
+    """Finished runs by the name of their job; their folders may no longer exist."""
 
     curves: Mapping[str, LearningCurve] = field(default_factory=dict[str, LearningCurve])
-    """What each iteration was like."""
+    """Their learning curves."""
     broken: frozenset[str] = frozenset()
-    """Those that broke down in their own numbers."""
+    """Those that diverged."""
     figures: Mapping[str, Mapping[str, float | None]] = field(
         default_factory=dict[str, Mapping[str, float | None]]
     )
-    """How their policies walked, as far as they were judged."""
+    """Figures of their policies, as far as they were judged."""
 
     @classmethod
     def read(cls, plan: Plan, out: Path) -> "EarlierRuns":
         """The runs of a plan in the report in `out`; none where there is no report.
 
         Raises:
-            GaitshiftError: a damaged table, or runs of other numbers than the plan's.
+            GaitshiftError: a table is damaged, or has runs with other settings than the plan's.
         """
         if not (out / RUNS_FILE).is_file():
             return cls()
@@ -92,13 +92,13 @@ class EarlierRuns:
 
 
 def fingerprint(job: Job) -> str:
-    """Of all that decides what a run does but its seed."""
+    """Fingerprint of all settings of a run except its seed."""
     numbers = {"machine": job.machine.to_dict(), "recipe": asdict(job.recipe)}
     return hashlib.sha256(json.dumps(numbers, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def _rows(path: Path) -> list[tuple[tuple[str, ...], dict[str, str]]]:
-    """The lines of a table after the runs that they are of."""
+    """The rows of a table by the key of their run."""
     try:
         return [(tuple(row[name] for name in KEY), row) for row in table.read(path)]
     except KeyError as error:
@@ -116,26 +116,26 @@ def _numbers(row: Mapping[str, str], where: str) -> dict[str, float | None]:
 
 @dataclass(frozen=True, kw_only=True)
 class Seeds:
-    """The runs of one setting and gait that differ in nothing but their seed."""
+    """The runs of one setting and gait that differ only in their seed."""
 
     jobs: tuple[Job, ...]
-    """Those that are over."""
+    """The finished jobs."""
     curves: tuple[LearningCurve, ...]
-    """One a job; a run that broke down has a short one, an empty one perhaps."""
+    """One per job; that of a diverged run is short or even empty."""
     broken: tuple[bool, ...]
-    """Which of them broke down in their own numbers."""
+    """Which of them diverged."""
 
     def __len__(self) -> int:
         return len(self.jobs)
 
     def cut(self, iterations: int, seeds: int) -> "Seeds":
-        """The first seeds, and the first of their iterations."""
+        """The first `seeds` seeds with their first `iterations` iterations."""
         curves = tuple(curve.cut(iterations) for curve in self.curves[:seeds])
         return Seeds(jobs=self.jobs[:seeds], curves=curves, broken=self.broken[:seeds])
 
     @property
     def walking(self) -> int:
-        """How many walk over the last tenth of their curve, by speed and machine."""
+        """Number of runs that walk over the last tenth of their curve, by speed and machine."""
         return sum(
             curve.late("speed") > WALKING_SPEED and curve.late("changes_per_s") > WALKING_CHANGES
             for curve in self._sound
@@ -143,7 +143,7 @@ class Seeds:
 
     @property
     def moving(self) -> int:
-        """How many are as fast then, in whatever gait."""
+        """Number of runs that are as fast over the last tenth of their curve, in any gait."""
         return sum(curve.late("speed") > WALKING_SPEED for curve in self._sound)
 
     @property
@@ -162,7 +162,7 @@ class Seeds:
         return median_iteration([curve.crosses_zero_at for curve in self.curves])
 
     def late(self, column: str) -> float | None:
-        """Mean over the runs that did not break down, over the last tenth of each."""
+        """Mean over the last tenth of the curves of the runs that did not diverge."""
         values = [curve.late(column) for curve in self._sound]
         return fmean(values) if values and all(map(isfinite, values)) else None
 
@@ -173,16 +173,16 @@ class Seeds:
 
 @dataclass(frozen=True, kw_only=True)
 class Results:
-    """All that is over of a plan."""
+    """All finished runs of a plan."""
 
     plan: Plan
-    """What was to be run."""
+    """The plan."""
     seeds: Mapping[tuple[str, str], Seeds]
-    """By name of setting and gait; what has no run that is over is missing."""
+    """By name of setting and gait; those without a finished run are missing."""
 
     @classmethod
     def read(cls, plan: Plan, runs: Path, earlier: EarlierRuns | None = None) -> "Results":
-        """Reads the progress of every run of the plan that is over, or that a report tells of."""
+        """Reads the progress of every run of the plan that is finished or in the earlier report."""
         earlier = earlier or EarlierRuns()
         found: dict[tuple[str, str], Seeds] = {}
         for job in plan.jobs:
@@ -215,14 +215,14 @@ class Results:
 
     @property
     def reference(self) -> Seeds | None:
-        """What ablations are held against: as many seeds and iterations as they have."""
+        """The reference of the ablations, with their number of seeds and iterations."""
         whole = self.seeds.get((PAPER, ABLATED))
         if whole is None:
             return None
         return whole.cut(self.plan.ablation_iterations, self.plan.ablation_seeds)
 
     def ablations(self) -> Iterator[tuple[str, Seeds]]:
-        """The ablations that are there, by the name of their setting."""
+        """The finished ablations, by the name of their setting."""
         for setting in ABLATIONS:
             if (setting.name, ABLATED) in self.seeds:
                 yield setting.name, self.seeds[setting.name, ABLATED]

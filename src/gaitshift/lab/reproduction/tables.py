@@ -12,7 +12,7 @@ ABLATED_RUNS = "ablations.csv"
 
 
 def gait_rows(judged: list[JudgedPolicy]) -> list[Row]:
-    """A row a policy of the paper's setting: from when it walked, and how it walks."""
+    """A row per policy of the paper's setting: when it began to walk, and its figures."""
     return [
         {
             "setting": PAPER,
@@ -26,7 +26,7 @@ def gait_rows(judged: list[JudgedPolicy]) -> list[Row]:
 
 
 def ablation_rows(results: Results) -> list[Row]:
-    """A row a setting, the reference first; means over the last tenth of the iterations."""
+    """A row per setting, the reference first; means over the last tenth of the iterations."""
     reference = results.reference
     rows = [] if reference is None else [_ablation_row(REFERENCE, reference)]
     settings = {setting.name: setting for setting in ABLATIONS}
@@ -34,7 +34,7 @@ def ablation_rows(results: Results) -> list[Row]:
 
 
 def run_rows(results: Results) -> list[Row]:
-    """A row a run: how far it came, and which recipe it is of."""
+    """A row per run: its iterations and the fingerprint of its recipe."""
     return [
         {
             "setting": job.setting.name,
@@ -50,7 +50,7 @@ def run_rows(results: Results) -> list[Row]:
 
 
 def curve_rows(results: Results) -> Iterator[Row]:
-    """A row an iteration of every run."""
+    """A row per iteration of every run."""
     for (setting, gait), seeds in results.seeds.items():
         for job, curve in zip(seeds.jobs, seeds.curves, strict=True):
             run: Row = {"setting": setting, "gait": gait, "seed": job.seed}

@@ -21,14 +21,14 @@ from gaitshift.learn.learner import DivergedError
 from gaitshift.learn.run import CHECKPOINTS, CONFIG, POLICY, PROGRESS, Run
 
 FAILED = "failed.txt"
-"""In the folder of a run that broke down in its own numbers: what it died of."""
+"""File in the folder of a diverged run, with the error."""
 
 
 def is_over(job: Job, folder: Path) -> bool:
-    """Whether there is nothing left to do: trained to the end, or broken down on the way.
+    """Whether the job is finished: trained to the end, or diverged.
 
     Raises:
-        GaitshiftError: the folder holds a run of other numbers.
+        GaitshiftError: the folder holds a run with other settings.
     """
     if not _started(folder):
         return False
@@ -39,9 +39,8 @@ def is_over(job: Job, folder: Path) -> bool:
 def train(job: Job, folder: Path) -> None:
     """Trains the job in its folder, from its last checkpoint if there is one.
 
-    A run whose numbers are no longer finite leaves `failed.txt` and what it learned so far: that is
-    a finding, and breaks no other run. Whatever else ends it (a full disk, say) is raised, and the
-    same call goes on.
+    A diverged run leaves `failed.txt` and its results so far; it counts as a result and does not
+    stop the other runs. Any other error (such as a full disk) is raised; the same call resumes.
     """
     run = Run.resume(folder) if _started(folder) else _create(job, folder)
     try:
@@ -51,7 +50,7 @@ def train(job: Job, folder: Path) -> None:
 
 
 def iterations_done(folder: Path) -> int:
-    """Iterations that a run has behind it, by the lines of its progress."""
+    """Iterations that a run has done, by the rows of its progress."""
     path = folder / PROGRESS
     return len(table.read(path, may_be_cut=True)) if path.is_file() else 0
 
@@ -72,7 +71,7 @@ def _create(job: Job, folder: Path) -> Run:
 
 
 def _trained_to_the_end(job: Job, folder: Path) -> bool:
-    """Whether the policy is that of the last iteration, and not of an interruption."""
+    """Whether the policy is that of the last iteration, and not that of an interruption."""
     path = folder / POLICY
     if not path.is_file():
         return False
@@ -86,11 +85,11 @@ def _check_same(job: Job, folder: Path) -> None:
         "recipe": asdict(job.recipe),
     }
     try:
-        kept = json.loads((folder / CONFIG).read_text())
+        saved = json.loads((folder / CONFIG).read_text())
     except (OSError, ValueError) as error:
         raise GaitshiftError(f"{folder / CONFIG} cannot be read: {error}") from error
     for name, value in wanted.items():
-        if kept.get(name) != json.loads(json.dumps(value)):
+        if saved.get(name) != json.loads(json.dumps(value)):
             raise GaitshiftError(
                 f"{folder} is a run with another {name}; give another --runs, or remove it"
             )

@@ -1,4 +1,4 @@
-"""Evidence on shifting: many robots, told with intervals."""
+"""Studies of gait shifts: many robots, results with confidence intervals."""
 
 from gaitshift.lab.studies.transitions import GROUNDS as GROUNDS
 from gaitshift.lab.studies.transitions import Outcomes as Outcomes

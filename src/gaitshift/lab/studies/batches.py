@@ -1,4 +1,4 @@
-"""Many runs, so many at a time."""
+"""Runs in batches."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 Outcome = TypeVar("Outcome")
-"""A dataclass of arrays, an entry a run."""
+"""A dataclass of arrays with one entry per run."""
 
 
 def in_batches(
@@ -18,9 +18,9 @@ def in_batches(
     seed: int,
     report: Callable[[int, int], None],
 ) -> Outcome:
-    """What all of `total` runs came to, at most `most` at a time.
+    """The outcomes of `total` runs, at most `most` at a time.
 
-    `run` takes how many and the seed of the batch, `report` the runs done and those in all.
+    `run` takes the number of runs and the seed of a batch, `report` the runs done and the total.
     """
     parts: list[Outcome] = []
     for index, first in enumerate(range(0, total, most)):

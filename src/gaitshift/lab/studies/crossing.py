@@ -24,7 +24,7 @@ BEFORE, NOISE, AFTER = 4.0, 15.0, 5.0
 """Metres of level ground, of noise, and of level ground again, from the start to the finish."""
 
 PATIENCE = 2.0
-"""Robots have this many times the time that they would need at the command."""
+"""Time limit of the robots over the time that they need at the commanded speed."""
 
 BATCH = 256
 """Robots at a time, over eight fields of noise."""
@@ -35,20 +35,20 @@ class Strategy:
     """How robots choose their gait."""
 
     name: str
-    """In words."""
+    """Name in tables."""
     start: str
     """Gait at the start."""
     graph: GaitGraph | None = None
-    """What they shift by; None: they keep their gait."""
+    """Gait graph by which they shift; None: they keep their gait."""
 
     @property
     def gaits(self) -> tuple[str, ...]:
-        """All that may appear."""
+        """All gaits that may appear."""
         return (self.start,) if self.graph is None else self.graph.gaits
 
 
 def strategies(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Strategy, ...]:
-    """Either gait alone, shifted by each of these conditions, and by an oracle of the ground."""
+    """Either gait alone, shifts by each of these conditions, and shifts by an oracle."""
     return (
         Strategy(f"{flat} only", flat),
         Strategy(f"{rough} only", rough),
@@ -61,18 +61,18 @@ def strategies(flat: str, rough: str, conditions: Sequence[str]) -> tuple[Strate
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Crossings:
-    """What came of N robots that were to cross."""
+    """Results of N crossings."""
 
     fell: Bool[np.ndarray, " N"]
     """Whether the robot fell before the finish."""
     arrived: Bool[np.ndarray, " N"]
-    """Whether it came to the finish in time."""
+    """Whether it reached the finish in time."""
     distance: Float[np.ndarray, " N"]
-    """How far it came along x, the finish at most [m]."""
+    """Distance along x, at most to the finish [m]."""
     speed: Float[np.ndarray, " N"]
     """Distance over the time until the finish, the fall or the end [m/s]."""
     cost_of_transport: Float[np.ndarray, " N"]
-    """Σ|τ q̇| over weight and distance; NaN for robots that came less than a metre."""
+    """Energy Σ|τ q̇| dt over weight and distance; NaN for robots that walked less than a metre."""
     shifts: Int[np.ndarray, " N"]
     """Changes of gait until then."""
 
@@ -86,7 +86,7 @@ def cross(
     seed: int,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Crossings:
-    """Sends robots over noise of an amplitude [m], the same fields and starts for every way."""
+    """Runs robots over noise of an amplitude [m]; fields and starts are the same for all."""
     return in_batches(
         lambda n, seed: _batch(policies, way, amplitude, n, seed=seed),
         runs,
@@ -127,7 +127,7 @@ def _batch(
 
 
 def measure_crossings(log: Log, way_to_go: float, mass: float) -> Crossings:
-    """What a log says of its robots: each of this mass [kg], on a way of this length [m]."""
+    """The results in a log of robots of this mass [kg] on a way of this length [m]."""
     x = log.truth.base_position_w[..., 0].astype(float) - log.truth.base_position_w[0, :, 0]
     over = ((x >= way_to_go) | log.fallen).cumsum(axis=0) > 0
     # entries until the finish, the fall or the end, itself included

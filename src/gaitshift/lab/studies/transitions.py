@@ -1,4 +1,4 @@
-"""One gait swapped for another in an instant, at every phase of the stride: what comes of it."""
+"""Results of instant shifts from one gait to another, at every phase of the stride."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,17 +22,18 @@ from gaitshift.sim.world import World
 from gaitshift.table import Row, markdown
 
 GROUNDS = ("flat", "perlin:0.10")
-"""Specs of the grounds that shifts are tried on."""
+"""Specs of the grounds on which shifts are tested."""
 
 WARM_UP = 2.0
 """Seconds in the old gait before the earliest shift; ours: it has settled by then."""
 
 WATCHED = 5.0
-"""Seconds in which a shift must come off."""
+"""Seconds within which a shift must succeed."""
 
 REACHED = 0.5
-"""The new gait is reached when this share of a stride's steps, and of every later one's, shows a
-stance of its machine; ours, below the limit of a clean gait on flat ground, as noise takes some."""
+"""The new gait is reached when this share of the steps of a stride, and of every later stride,
+shows a stance of its machine; ours: below the limit of a clean gait on flat ground, since noise
+lowers it."""
 
 BATCH = 512
 """Robots at a time: their log takes 130 MB."""
@@ -48,16 +49,16 @@ class Pair:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outcomes:
-    """What came of N shifts."""
+    """Results of N shifts."""
 
     phase: Float[np.ndarray, " N"]
-    """Of the stride of FL in the old gait at the shift, from touchdown on [stride]."""
+    """Time since the last touchdown of FL at the shift [stride of the old gait]."""
     fell: Bool[np.ndarray, " N"]
     """Whether the robot fell within `WATCHED` seconds."""
     settle: Float[np.ndarray, " N"]
     """Time until the new gait is reached for good [s]; NaN where it never is."""
     dip: Float[np.ndarray, " N"]
-    """By how much the mean speed of a stride fell below the slower of the two commands [m/s]."""
+    """Largest drop of a stride's mean speed below the slower of the two commands [m/s]."""
     tilt: Float[np.ndarray, " N"]
     """Largest angle of the body from upright after the shift [rad]."""
 
@@ -76,7 +77,7 @@ def run_pair(
     seed: int,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Outcomes:
-    """Shifts robots from one gait to the other, each at an instant of its own in the stride."""
+    """Shifts robots from one gait to the other, each at its own phase of the stride."""
     return in_batches(
         lambda n, seed: _run_batch(policies, pair, ground, n, seed=seed),
         switches,
@@ -88,7 +89,7 @@ def run_pair(
 
 @dataclass(frozen=True, eq=False)
 class _AtSteps:
-    """Changes each robot's gait once, at a step of its own."""
+    """Changes each robot's gait once, at its own step."""
 
     step_of: Int[np.ndarray, " N"]
     gait: str
@@ -96,7 +97,7 @@ class _AtSteps:
     def step(
         self, sensed: Proprioception, controller: Controller, truth: Privileged | None = None
     ) -> Decision:
-        """Changes those that are due in the control step that ends now."""
+        """Changes the gaits that are due in the control step that ends now."""
         due = self.step_of == round(float(sensed.time) / CONTROL_PERIOD)
         controller.switch(np.flatnonzero(due), self.gait, sensed)
         return uncounted(due)
@@ -148,13 +149,13 @@ def measure_shifts(log: Log, at: Int[np.ndarray, " N"], old: Policy, new: Policy
 
 
 def running_mean(values: Float[np.ndarray, "T N"], window: int) -> Float[np.ndarray, "S N"]:
-    """Means over each `window` entries in a row; entry s is over s to s + window − 1."""
+    """Means over `window` consecutive entries; entry s is the mean over s to s + window − 1."""
     total = np.concatenate([np.zeros((1, values.shape[1])), values.cumsum(axis=0)])
     return (total[window:] - total[:-window]) / window
 
 
 def _settled(reached: Bool[np.ndarray, "S N"], stride: int) -> Float[np.ndarray, " N"]:
-    """End of the first stride from which on the gait is reached in all [s]; NaN if in none."""
+    """End of the first stride from which on the gait is always reached [s]; NaN if never."""
     lost = ~reached
     last = len(reached) - lost[::-1].argmax(axis=0)  # the entry after the last that is not reached
     first = np.where(lost.any(axis=0), last, 0)
@@ -164,7 +165,7 @@ def _settled(reached: Bool[np.ndarray, "S N"], stride: int) -> Float[np.ndarray,
 def _phase(
     contact: Bool[np.ndarray, "T N"], at: Int[np.ndarray, " N"], old: Policy
 ) -> Float[np.ndarray, " N"]:
-    """Part of a stride since the last touchdown of FL before `at`."""
+    """Time since the last touchdown of FL before `at` [stride]."""
     lands = contact & ~np.concatenate([contact[:1], contact[:-1]])
     steps = np.where(lands, np.arange(len(contact))[:, None], -1)
     last = np.maximum.accumulate(steps, axis=0)[at, np.arange(len(at))]

@@ -37,10 +37,10 @@ def watch(
     sensed: Proprioception,
     rough: Bool[np.ndarray, " N"] | None = None,
 ) -> tuple[Any, Float[np.ndarray, "N M"]]:
-    """What a statistic remembers after a control step, and its numbers.
+    """The memory of a statistic after a control step, and its values.
 
     Raises:
-        GaitshiftError: an oracle, and nobody says which ground is `rough`.
+        GaitshiftError: the statistic is an oracle, and `rough` is not given.
     """
     if isinstance(statistic, Oracle):
         if rough is None:

@@ -1,4 +1,4 @@
-"""Whether the body keeps to its heading: a robot that stumbles is thrown off it."""
+"""Deviation of the body from its heading, which is large when the robot stumbles."""
 
 from dataclasses import dataclass
 
@@ -11,26 +11,27 @@ from gaitshift.robot.state import Proprioception
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeadingState:
-    """What `HeadingWatch` remembers of N robots."""
+    """State of `HeadingWatch` for N robots."""
 
     yaw: Float[np.ndarray, " N"]
-    """Heading that is followed [rad]; NaN before the first step."""
+    """Filtered heading [rad]; NaN before the first step."""
     rate: Float[np.ndarray, " N"]
-    """Yaw rate that is followed [rad/s]."""
+    """Filtered yaw rate [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeadingWatch:
-    """Follows heading and yaw rate, and says how far robots are off them.
+    """Filters the heading, and measures how far robots deviate from it.
 
-    A critically damped follower of second order (an α-β filter): steady turns leave no error.
+    It is a critically damped second-order filter (an α-β filter), without error in steady turns.
     """
 
     limit: float = 0.08
-    """Who is further off than this is thrown off [rad]; ours: on `perlin:0.20` the trot is off by
-    less than 0.05 in all but one step of a thousand, who stumbles at a step by 0.12 and more."""
+    """A robot with a larger deviation stumbles [rad]; ours: on `perlin:0.20` the trot deviates by
+    less than 0.05 in all but one step of a thousand; one that stumbles at a step, by at least
+    0.12."""
     frequency: float = 2.0
-    """How fast it follows [rad/s]."""
+    """Natural frequency of the filter [rad/s]."""
 
     def __post_init__(self) -> None:
         if not self.limit > 0.0 or not self.frequency > 0.0:
@@ -39,21 +40,21 @@ class HeadingWatch:
             )
 
     def start(self, n: int) -> HeadingState:
-        """State of n robots whose heading is not known yet."""
+        """State of n robots with unknown headings."""
         return HeadingState(yaw=np.full(n, np.nan), rate=np.zeros(n))
 
     def step(
         self, state: HeadingState, sensed: Proprioception
     ) -> tuple[HeadingState, Float[np.ndarray, " N"]]:
-        """The heading after this step, and how far off each is [rad]; 0 without a heading."""
+        """State after this step, and the deviation of each robot [rad]; 0 without a heading."""
         if not sensed.has_heading:
             return state, np.zeros(len(state.yaw))
         period = sensed.period
-        kept = np.exp(-self.frequency * period)
+        decay = np.exp(-self.frequency * period)
         expected = np.where(np.isnan(state.yaw), sensed.yaw, state.yaw + state.rate * period)
         off = np.remainder(sensed.yaw - expected + np.pi, 2.0 * np.pi) - np.pi
         after = HeadingState(
-            yaw=expected + (1.0 - kept * kept) * off,
-            rate=state.rate + (1.0 - kept) ** 2 / period * off,
+            yaw=expected + (1.0 - decay * decay) * off,
+            rate=state.rate + (1.0 - decay) ** 2 / period * off,
         )
         return after, off

@@ -1,4 +1,4 @@
-"""A point of reference: what a condition would do that sees the ground."""
+"""The oracle, a reference for conditions: it reads the true roughness of the ground."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from gaitshift.shift.statistic import SearchRange
 class Oracle:
     """1 where the ground under the robot is rough, 0 where not.
 
-    No `Statistic`: it reads the truth, which a robot does not have.
+    It is not a `Statistic`, because it reads the truth, which a robot does not have.
     """
 
     unit = ""
@@ -23,8 +23,8 @@ class Oracle:
     )
 
     def start(self, n: int) -> None:
-        """Nothing to remember."""
+        """No memory."""
 
     def values(self, rough: Bool[np.ndarray, "*batch"]) -> Float[np.ndarray, "*batch 1"]:
-        """The truth as a number."""
+        """1 where `rough`, 0 elsewhere."""
         return rough.astype(np.float64)[..., None]

@@ -1,4 +1,4 @@
-"""How far the last touches of the feet lie from one plane: slopes are not roughness."""
+"""Deviation of the last touches of the feet from a plane, so that slopes do not count as rough."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,24 +11,25 @@ from gaitshift.shift.statistic import SearchRange
 from gaitshift.shift.statistics.touches import Touches, TouchState, fit_plane
 
 LEAST = 4
-"""Touches below which there is nothing to tell: a plane goes through any three."""
+"""Least number of touches for a value: a plane goes through any three."""
 
 _RIDGE = 1e-9
-"""[m²], where feet stand in one line."""
+"""Ridge of the fit [m²], for feet in one line."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PlaneResidual:
     """Standard deviation of the last touches about the plane through them, along the vertical [m].
 
-    √(Σr² / (m − 3)) for the m touches kept, the degrees of freedom that a plane leaves. Leg
-    odometry carries the touches along. With one touch a foot this is the paper's h less a plane.
+    √(Σr² / (m − 3)) for m touches; a plane has three parameters, so m − 3 degrees of freedom
+    remain. Leg odometry gives the positions of earlier touches. With one touch per foot these are
+    the paper's h less a plane.
     """
 
     touches: int = 2
-    """Touches kept of each foot."""
+    """Number of touches of each foot in memory."""
     least_swing: float = 0.05
-    """A foot that comes down again sooner has bounced: it is the same touch [s]."""
+    """A foot that touches again sooner has bounced: it is the same touch [s]."""
 
     unit = "m"
     width = 1
@@ -43,13 +44,13 @@ class PlaneResidual:
         return Touches(kept=self.touches, least_swing=self.least_swing)
 
     def start(self, n: int) -> TouchState:
-        """State of n robots of which no foot has touched."""
+        """State of n robots before any touch."""
         return self._memory.start(n)
 
     def step(
         self, state: TouchState, sensed: Proprioception
     ) -> tuple[TouchState, Float[np.ndarray, "N 1"]]:
-        """Touches after this step, and how far from a plane they lie."""
+        """Touches after this step, and their deviation from a plane."""
         after, _, _ = self._memory.step(state, sensed)
         points = after.points
         return after, deviation(points, ~np.isnan(points[..., 0]))[:, None]
@@ -60,7 +61,7 @@ def deviation(
 ) -> Float[np.ndarray, " N"]:
     """√(Σr² / (m − 3)) of the m known points about their least-squares plane z(x, y) [m].
 
-    NaN below four points; points that lie in one line are held against the line.
+    NaN below four points. For points in one line it is the deviation from the line.
     """
     count = known.sum(axis=1)
     above = fit_plane(points, known, _RIDGE).above(points)

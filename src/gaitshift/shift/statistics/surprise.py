@@ -1,4 +1,4 @@
-"""How far from where the last touches let one expect it the ground ahead is met."""
+"""Prediction errors of touchdown heights: new ground against a plane through earlier touches."""
 
 import math
 from dataclasses import dataclass, replace
@@ -14,82 +14,83 @@ from gaitshift.shift.statistics.heading import HeadingState, HeadingWatch
 from gaitshift.shift.statistics.touches import Touches, TouchState, fit_plane
 
 LEAST = 6
-"""Earlier touches from which a plane is worth believing."""
+"""Least number of earlier touches for a plane."""
 
 AHEAD = 0.1
 """Ground is new where no earlier touch lies further ahead by more than this [m]."""
 
 RIDGE = 0.02
-"""[m²]: a plane through touches that are near one line does not tilt across it at will."""
+"""Ridge of the fit [m²]: it keeps a plane through touches near one line level across the line."""
 
 LAG = 3
-"""An error is held against the one before it, and the one this many before it: of a trot's front
-feet, which take turns, against the other foot half a stride and one and a half strides ago."""
+"""An error is compared with the one before it and the one this many before it. In a trot, whose
+front feet alternate, both are of the other foot, half a stride and one and a half strides ago."""
 
 FROM_MEAN = math.sqrt(math.pi) / 2.0
-"""Deviation of normal errors over the mean size of their differences: 2/√π deviations."""
+"""Standard deviation σ of normal errors over the mean size of their differences, which is 2σ/√π."""
 
 STEEP = 0.08
-"""Rise over run from which ground is steep: a slope of 5°; ours, noise of 10 cm seldom is."""
+"""Rise over run above which ground is steep: a slope of 5°; ours: noise of 10 cm seldom is."""
 
 STEEP_FOR = 15.0
-"""Touchdowns in which steep ground is forgotten by e."""
+"""Decay constant of the memory of steep ground [touchdowns]."""
 
 STEADY = 0.0055
-"""A body that is off its heading by less than this [rad] keeps to it; ours, a trot's on flat."""
+"""Heading deviation of normal walking [rad]; ours: that of a trot on flat ground."""
 
 ASIDE_WINDOW = 1.0
-"""How far it is off is a root mean square that forgets by e in this time [s]."""
+"""Time constant of the root mean square of the heading deviation [s]."""
 
 _HEADING = HeadingWatch()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SurpriseState:
-    """What `TouchdownSurprise` remembers."""
+    """State of `TouchdownSurprise`."""
 
     touches: TouchState
     """The touches of all feet."""
     heading: HeadingState
-    """The heading that the robot keeps to."""
+    """The filtered heading."""
     aside: Float[np.ndarray, " N"]
-    """Mean square of how far it is off that [rad²]."""
+    """Mean square of the deviation from it [rad²]."""
     error: Float[np.ndarray, "N 4"]
-    """The last errors, the last first [m]; NaN before that."""
+    """The last errors, the latest first [m]; NaN before."""
     change: Float[np.ndarray, "N 2"]
     """Mean sizes of their changes, over one touchdown and over `LAG` [m]."""
     steep: Float[np.ndarray, " N"]
-    """Rise over run of the steepest of the last planes, the less the longer ago."""
+    """Rise over run of the steepest of the last planes; it decays with time."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TouchdownSurprise:
     """How much the errors of the last touchdowns differ from one to the next [m].
 
-    Each foot that comes down on new ground, ahead of all earlier touches, is held against the plane
-    through those, along the vertical: that is its error. A slope has none; where it begins errors
-    grow and fade; a single step changes them once; noise changes them at each touchdown. The number
-    is the errors' deviation by the mean size of their changes from one touchdown to the next (after
-    von Neumann 1941, who takes their squares, in which a single step weighs more). A drift, as at
-    the foot of a slope, is taken out: a change over n touchdowns has n times as much of it as one
-    over one, and so n² m₁² − mₙ², over n² − 1, of the means m has none, and is m₁² where errors
-    know nothing of one another (`LAG`, `FROM_MEAN`). Means start at 0: what was not seen is smooth.
-    Feet that come down where others stood before say nothing new, and do not count.
+    A foot that comes down on new ground, ahead of all earlier touches, has an error: its height
+    above the plane through these touches, along the vertical. On a slope errors are 0; at its start
+    they grow and decay; a single step changes them once; noise changes them at each touchdown. The
+    value is the standard deviation of the errors, estimated from the mean size of their changes
+    from one touchdown to the next (after von Neumann 1941, who uses squares, in which a single step
+    weighs more). A drift, as at the foot of a slope, is removed: over n touchdowns it changes an
+    error n times as much as over one. With the means mₙ of the sizes of changes over n touchdowns,
+    (n² m₁² − mₙ²) / (n² − 1) has no drift, and equals m₁² for independent errors (`LAG`,
+    `FROM_MEAN`). Means start at 0: unknown ground counts as smooth. A foot that comes down among
+    earlier touches does not count.
 
-    Two things make it smaller. Where the ground was steep, its end is to be expected: the number is
-    divided by how many times steeper than `STEEP` the plane was of late. And odometry by the feet
-    is worth the less the more the body is turned aside, as at the edge of a step: it is divided by
-    how many times further than `STEADY` the robot is off its heading. One that is thrown off it
-    altogether stumbles: all is forgotten, and nothing said until there are errors enough again.
-    Where no yaw is given, neither of the last two is done.
+    Two factors reduce the value. After steep ground an error at its end is expected: the value is
+    divided by the recent steepness over `STEEP`, if above 1. Leg odometry is less reliable when the
+    body turns, as at the edge of a step: the value is divided by the heading deviation over
+    `STEADY`, if above 1. A robot whose deviation exceeds `HeadingWatch.limit` stumbles: its state
+    is reset, and the value is NaN until there are enough errors again. Without a yaw the heading is
+    not used.
     """
 
     touches: int = 4
-    """Touches of each foot that the plane goes through."""
+    """Number of touches of each foot in the fit of the plane."""
     memory: float = 10.0
-    """Touchdowns on new ground in which the means forget by e; 1: the last change alone."""
+    """Decay constant of the means [touchdowns on new ground]; 1: the last change alone."""
     least_swing: float = 0.05
-    """A foot that comes down again sooner has bounced: it is the same touch [s]."""
+    """A foot that touches again sooner has bounced: it is the same touch [s]."""
 
     unit = "m"
     width = 1
@@ -111,7 +112,7 @@ class TouchdownSurprise:
         return Touches(kept=self.touches, least_swing=self.least_swing)
 
     def start(self, n: int) -> SurpriseState:
-        """State of n robots of which no foot has touched."""
+        """State of n robots before any touch."""
         return SurpriseState(
             touches=self._memory.start(n),
             heading=_HEADING.start(n),
@@ -124,7 +125,7 @@ class TouchdownSurprise:
     def step(
         self, state: SurpriseState, sensed: Proprioception
     ) -> tuple[SurpriseState, Float[np.ndarray, "N 1"]]:
-        """Errors after this step, and what their changes come to; NaN until there are enough."""
+        """State after this step, and the value; NaN until there are enough errors."""
         touches, new, foot = self._memory.step(state.touches, sensed)
         heading, off = _HEADING.step(state.heading, sensed)
         share = min(1.0, sensed.period / ASIDE_WINDOW)
@@ -136,8 +137,8 @@ class TouchdownSurprise:
             above, slope, counts = _met(state.touches, touches, new, foot, ids)
             error[ids], change[ids] = self._take_in(error[ids], change[ids], above, counts)
             met = counts.sum(axis=1)
-            kept = np.exp(-met / STEEP_FOR) * steep[ids]
-            steep[ids] = np.where(met > 0, np.maximum(slope, kept), steep[ids])
+            remembered = np.exp(-met / STEEP_FOR) * steep[ids]
+            steep[ids] = np.where(met > 0, np.maximum(slope, remembered), steep[ids])
         thrown = np.abs(off) > _HEADING.limit
         if thrown.any():
             touch = np.where(thrown[:, None, None, None], np.nan, touches.touch)
@@ -167,7 +168,7 @@ class TouchdownSurprise:
         above: Float[np.ndarray, "K 4"],
         counts: Bool[np.ndarray, "K 4"],
     ) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, "K 2"]]:
-        """Errors and means after the feet that count, `above` [m] where they were expected."""
+        """Errors and means with the errors `above` [m] of the feet that count."""
         for leg in range(4):
             size = np.abs(above[:, leg, None] - error[:, [0, LAG - 1]])
             taken = counts[:, leg, None] & ~np.isnan(size)
@@ -184,10 +185,10 @@ def _met(
     foot: Float[np.ndarray, "N 4 3"],
     ids: np.ndarray,
 ) -> tuple[Float[np.ndarray, "K 4"], Float[np.ndarray, " K"], Bool[np.ndarray, "K 4"]]:
-    """Robots `ids` against the plane of their earlier touches.
+    """Feet of the robots `ids` relative to the plane through their earlier touches.
 
-    How far above it their feet are [m], its rise over run, and which feet count: those do that came
-    down on new ground, where enough earlier touches are known.
+    Returns the height of the feet above it [m], its rise over run, and which feet count: those that
+    came down on new ground, of robots with enough earlier touches.
     """
     points, came = before.points[ids], foot[ids]
     known = ~np.isnan(points[..., 0])

@@ -1,4 +1,4 @@
-"""Where the feet touched last, carried along by leg odometry: what terrain can be read from."""
+"""The last touches of the feet, tracked by leg odometry, from which the terrain is estimated."""
 
 from dataclasses import dataclass
 
@@ -85,30 +85,30 @@ def upright(sensed: Proprioception) -> Float[np.ndarray, "N 4 3"]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TouchState:
-    """What `Touches` remembers."""
+    """State of `Touches`."""
 
     odometry: OdometryState
-    """Where the base is."""
+    """State of the odometry."""
     touch: Float[np.ndarray, "N 4 K 3"]
-    """Where each foot touched, the last first, in the odometry's frame [m]; NaN before that."""
+    """Last touches of each foot, the latest first, in the odometry's frame [m]; NaN before."""
     time_up: Float[np.ndarray, "N 4"]
-    """For how long each foot has not touched [s]."""
+    """Time since each foot last touched [s]."""
 
     @property
     def points(self) -> Float[np.ndarray, "N P 3"]:
-        """All touches in a row."""
+        """Touches of all feet along one axis."""
         n, feet, kept, _ = self.touch.shape
         return self.touch.reshape(n, feet * kept, 3)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Touches:
-    """Keeps the last touches of each foot."""
+    """Records the last touches of each foot."""
 
     kept: int
-    """Touches of each foot."""
+    """Number of touches of each foot in memory."""
     least_swing: float
-    """A foot that comes down again sooner has bounced: it is the same touch [s]."""
+    """A foot that touches again sooner has bounced: it is the same touch [s]."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.kept <= 100:
@@ -119,7 +119,7 @@ class Touches:
             )
 
     def start(self, n: int) -> TouchState:
-        """State of n robots of which no foot has touched."""
+        """State of n robots before any touch."""
         return TouchState(
             odometry=LegOdometry().start(n),
             touch=np.full((n, 4, self.kept, 3), np.nan),
@@ -129,9 +129,9 @@ class Touches:
     def step(
         self, state: TouchState, sensed: Proprioception
     ) -> tuple[TouchState, Bool[np.ndarray, "N 4"], Float[np.ndarray, "N 4 3"]]:
-        """The touches after this step, which feet came down in it, and where all feet are [m].
+        """The touches after this step, which feet came down in it, and positions of all feet [m].
 
-        A foot's last touch goes along with it while it stands.
+        The last touch of a foot follows the foot while it stands.
         """
         odometry, foot = LegOdometry().step(state.odometry, sensed)
         contact = sensed.contact
@@ -149,12 +149,12 @@ class Plane:
     """z = height + slope · (x, y) about a middle point, for each of N robots."""
 
     middle: Float[np.ndarray, "N 3"]
-    """Mean of the points it goes through [m]."""
+    """Mean of the fitted points [m]."""
     slope: Float[np.ndarray, "N 2"]
     """dz/dx and dz/dy."""
 
     def above(self, points: Float[np.ndarray, "N P 3"]) -> Float[np.ndarray, "N P"]:
-        """How far each point lies above it, along the vertical [m]."""
+        """Height of each point above the plane, along the vertical [m]."""
         x, y, z = (points[..., axis] - self.middle[:, axis, None] for axis in range(3))
         return z - self.slope[:, :1] * x - self.slope[:, 1:] * y
 
@@ -166,13 +166,13 @@ def fit_plane(
 
     Args:
         points: x, y, z [m].
-        known: which of them count.
-        ridge: keeps slopes small [m²] in directions in which the points hardly spread.
+        known: which points are used.
+        ridge: keeps slopes small [m²] in directions in which the points are close together.
     """
     count = np.maximum(known.sum(axis=1), 1)
-    kept = np.where(known[..., None], points, 0.0)
-    middle = kept.sum(axis=1) / count[:, None]
-    x, y, z = (np.where(known, kept[..., i] - middle[:, i, None], 0.0) for i in range(3))
+    used = np.where(known[..., None], points, 0.0)
+    middle = used.sum(axis=1) / count[:, None]
+    x, y, z = (np.where(known, used[..., i] - middle[:, i, None], 0.0) for i in range(3))
     xx, xy, yy = (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
     xz, yz = (x * z).sum(axis=1), (y * z).sum(axis=1)
     determinant = (xx + ridge) * (yy + ridge) - xy * xy

@@ -106,8 +106,9 @@ def _introduction(results: Results) -> str:
     runs = sum(map(len, results.seeds.values()))
     return "\n".join(
         (
-            f"Written by `gaitshift reproduce` from {runs} of {len(plan.jobs)} runs. All numbers "
-            "and verdicts are computed from them.",
+            "This page compares each statement of the paper with our runs, and says whether it "
+            f"holds. Written by `gaitshift reproduce` from {runs} of {len(plan.jobs)} runs; all "
+            "numbers and verdicts are computed from them.",
             f"Each run has {recipe.robots} robots × {recipe.steps} steps × {recipe.iterations} "
             "iterations on flat ground at 100 Hz, with the rewards of Table I, b = 200, and the "
             f"network and PPO settings of the paper; there are {plan.seeds} seeds for each gait.",

@@ -94,7 +94,7 @@ class World:
         terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
         if not terrains:
             raise GaitshiftError("there must be at least one terrain, got none")
-        kept = self._kept_state(terrains) if hasattr(self, "_batch") else None
+        state = self._kept_state(terrains) if hasattr(self, "_batch") else None
         self.terrains = terrains[: self.n]
         models = [build_model(self.robot, self._gains, ground) for ground in self.terrains]
         self.model = models[0]
@@ -106,8 +106,8 @@ class World:
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._ctrl, self._applied = batch.bind("ctrl"), batch.bind("qfrc_applied")
         self._sensors, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
-        if kept is not None:
-            self._qpos[:], self._qvel[:] = kept
+        if state is not None:
+            self._qpos[:], self._qvel[:] = state
             self._settle(np.arange(self.n))
 
     def place(
