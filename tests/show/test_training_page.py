@@ -64,7 +64,7 @@ def test_walks_of_the_checkpoints_and_of_the_end_are_there_to_choose_from(page):
 
 
 def test_verdicts_and_the_command_are_told(page):
-    told = page.split("Verdicts on the way")[1].split("</table>")[0]
+    told = page.split("Verdicts at checkpoints")[1].split("</table>")[0]
     assert told.count("<td>none</td>") == 2
     assert told.count("<td>0.25</td>") == 2
     assert "train &lt;trot&gt;" in page
