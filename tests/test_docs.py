@@ -62,7 +62,7 @@ def test_the_site_is_built_without_a_warning(tmp_path):
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
     reference = (tmp_path / "reference.html").read_text(encoding="utf-8")
-    for name in ("Condition", "TouchdownSurprise", "RewardMachine", "Recording", "GaitEnv"):
+    for name in ("GaitGraph", "TouchdownSurprise", "RewardMachine", "LabelledRun", "GaitEnv"):
         assert f">{name}<" in reference or f'{name}"' in reference, name
 
 
