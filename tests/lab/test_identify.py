@@ -331,7 +331,7 @@ def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys
     assert [row["robots"] for row in rows] == [8, 8]
     before = [path.stat().st_mtime_ns for path in sorted(logs.iterdir())]
     main(command)
-    assert "cached" in capsys.readouterr().err
+    assert "exists, not repeated" in capsys.readouterr().err
     assert [path.stat().st_mtime_ns for path in sorted(logs.iterdir())] == before
     files = [str(path) for path in sorted(logs.iterdir())]
     main(["identify", *files, "--out", str(tmp_path / "report"), "--json"])
