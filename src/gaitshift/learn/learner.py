@@ -125,7 +125,7 @@ class _Statistics:
         truncated: np.ndarray,
         info: dict[str, Any],
     ) -> None:
-        """Takes in one step of all robots."""
+        """Adds one step of all robots."""
         seen = {
             "reward": reward,
             "reward/bonus": info["bonus"],

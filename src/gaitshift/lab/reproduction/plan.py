@@ -14,7 +14,7 @@ author's code for another robot has 10, and the published plateau of 25 to 27 as
 b = 200 added at most every 20 steps no reward above 10 + 200 / 20 = 20 a step can be had."""
 
 PAPER = "paper"
-"""Name of the setting that the others are held against."""
+"""Name of the setting with which the others are compared."""
 
 
 @dataclass(frozen=True, kw_only=True)
