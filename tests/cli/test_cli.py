@@ -73,7 +73,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         ),
         (
             ["evaluate", "trot", "--controller", "cpg", "--robot-file", "dog.toml"],
-            "--robot-file is for policies, got --controller cpg",
+            "dog.toml: no such file",
         ),
         (["demo", "--graph", "lava"], "unknown graph 'lava'"),
         (["demo", "--controller", "wheels"], "known controllers: policy, cpg"),

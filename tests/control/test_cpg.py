@@ -180,7 +180,7 @@ def test_oscillators_are_judged_as_policies_are(capsys, tmp_path):
         (["trot", "--commands"], "--commands is for policies, got --controller cpg"),
         (
             ["trot", "--robot-file", "pony.toml"],
-            "--robot-file is for policies, got --controller cpg",
+            "pony.toml: no such file",
         ),
         (["gallop", "--log", "{folder}/new/log.npz"], "got 'gallop'"),
     ],

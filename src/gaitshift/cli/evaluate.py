@@ -177,9 +177,7 @@ class Evaluate(RobotOption, EvaluationConfig):
             return
         mode = "--commands" if self.commands else "--trials"
         if self.controller != "policy":
-            raise GaitshiftError(
-                f"{mode} must not be given with --controller {self.controller}, only with policies"
-            )
+            raise GaitshiftError(f"{mode} is for policies, got --controller {self.controller}")
         if self.commands and (self.trials or self.log or self.plot):
             raise GaitshiftError("--commands must not be given with --trials, --log or --plot")
         for field in fields(EvaluationConfig):
