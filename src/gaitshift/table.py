@@ -149,12 +149,12 @@ def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
     try:
         with path.open(newline="") as file:
             reader = csv.DictReader(file)
-            rows = list(reader)
+            columns, rows = tuple(reader.fieldnames or ()), list(reader)
     except OSError as error:
         raise GaitshiftError(f"{path} cannot be read: {error.strerror}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise GaitshiftError(f"{path} is damaged: {error}") from error
-    return tuple(reader.fieldnames or ()), rows
+    return columns, rows
 
 
 def _is_whole(row: Mapping[str, str]) -> bool:
