@@ -36,7 +36,7 @@ ORACLE = Recipe(
 def learned_values(env, recipe, observations, *, iterations):
     """V of the observations, as the critic has it after some iterations; the actor stays as it is.
 
-    Where every action is worth the same an actor that learns strays, and with it what is seen.
+    All actions earn the same here, so an actor that learns drifts, and so do its observations.
     """
     torch.set_num_threads(1)
     torch.manual_seed(0)

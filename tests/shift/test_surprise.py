@@ -27,7 +27,7 @@ def test_who_sways_is_told_less_in_proportion():
 
     still = told(0.0)
     assert told(0.5 * STEADY) == pytest.approx(still, rel=1e-3), (
-        "who sways by less than a steady walker is told all"
+        "a robot that sways less than a steady walker keeps its full value"
     )
     assert told(8.0 * STEADY) == pytest.approx(still / (8.0 / math.sqrt(2.0)), rel=0.05)
 

@@ -1,4 +1,4 @@
-"""Robots that walk on a page: they do as they are told, and are recorded as they were seen."""
+"""Robots that walk on a page: they follow its controls, and a recording shows what was drawn."""
 
 import json
 import re
@@ -27,7 +27,7 @@ def test_a_page_walks_no_faster_than_time_and_draws_every_second_step(capsys):
     found = json.loads(capsys.readouterr().out)
     assert list(found) == ["robots_1", "robots_16"]
     for figures in found.values():
-        assert 0.0 < figures["real_time"] <= 1.02  # a busy machine is slower, and no fault
+        assert 0.1 < figures["real_time"] <= 1.02
         assert figures["pictures_per_s"] == pytest.approx(50 * figures["real_time"])
         assert 0.0 < figures["core_share"] <= 1.05
     one, many = found.values()

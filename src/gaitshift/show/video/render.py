@@ -89,7 +89,7 @@ class Playback:
 
 
 _SPEED_SIGMA = 0.3
-"""Of the window over the speed that is told [s]: a number that trembles cannot be read."""
+"""Width of the window that smooths the displayed speed [s], so that the number can be read."""
 
 _SMALLEST = 160
 """Least width and height [pixel]."""
