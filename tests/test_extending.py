@@ -117,7 +117,7 @@ beta = 2
 STATUE = '''
 import numpy as np
 
-from gaitshift.control.repertoire import Repertoire
+from gaitshift.control.controller import Repertoire
 from gaitshift.gait.gaits import load
 from gaitshift.robot.description import ANYMAL_B
 

@@ -169,7 +169,7 @@ def begin_recording(page):
 def end_recording(page, folder):
     """The log that was saved."""
     page.get_by_role("button", name="end and save", exact=True).click()
-    page.get_by_text("opens from disk").first.wait_for()
+    page.get_by_text("play the log with").first.wait_for()
     return Log.load(folder / "log-1.npz")
 
 
