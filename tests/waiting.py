@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-PATIENCE = 1200.0
+PATIENCE = 400.0
 """Longest wait [s]; ours: a busy machine is ten times slower than a quiet one, a fault lasts."""
 
 
