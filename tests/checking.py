@@ -22,8 +22,11 @@ check_types = beartype(
 It knows `Self` where it decorates whole classes alone, so that here anything may stand for it.
 """
 
-FIRST, EVERY = 50, 20
-"""ours: of each function's calls in a test, the first 50 are checked and then one in 20."""
+FIRST, EVERY = 5, 101
+"""ours: of each function's calls in a test, the first 5 are checked and then one in 101.
+
+A check costs up to a millisecond: 50 and one in 20 makes a demonstration 2.7 times as slow.
+"""
 
 _calls = {}
 
