@@ -266,7 +266,7 @@ def test_a_controller_is_one_file_and_one_line(copy):
     copy.add_file("control/statue.py", STATUE)
     registry = '    "cpg": "gaitshift.control.cpg:CpgController",\n'
     copy.add_line(
-        "control/controllers.py", registry, '    "statue": "gaitshift.control.statue:Statue",'
+        "control/controller.py", registry, '    "statue": "gaitshift.control.statue:Statue",'
     )
     few = ["--controller", "statue", "--seconds", "1", "--json"]
     said = copy.python("-m", "gaitshift", "evaluate", "pronk", *few, "--episodes", "2")
