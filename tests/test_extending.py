@@ -27,8 +27,7 @@ PONY = Path(__file__).parents[1] / "examples" / "robots" / "pony.toml"
 RAMPS = """
 import numpy as np
 
-from gaitshift.sim.terrain.grid import FINE_CELL, Grid
-from gaitshift.sim.terrain.kind import Kind, Quantity, spell
+from gaitshift.sim.terrain.kind import FINE_CELL, Grid, Kind, Quantity, spell
 
 HEIGHT = Quantity(name="height", unit="m", low=0.0, high=0.5)
 
