@@ -9,7 +9,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -qq
 PYTEST_ARGS ?= -n 2 --dist worksteal
 GAITS ?=
 # What the wheel is tried with: quick tests that need neither torch nor a browser.
-WHEEL_TESTS := tests/gait tests/shift tests/sim/test_terrain.py
+WHEEL_TESTS := tests/gait tests/shift tests/sim/test_terrain*.py
 # What the newest versions are tried with, without torch: these, and pictures and physics.
 NEWEST_TESTS := $(WHEEL_TESTS) tests/show/test_plots.py tests/show/test_geometry.py tests/sim/test_world.py
 

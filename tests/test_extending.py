@@ -27,8 +27,7 @@ PONY = Path(__file__).parents[1] / "examples" / "robots" / "pony.toml"
 RAMPS = """
 import numpy as np
 
-from gaitshift.sim.terrain.grid import FINE_CELL, Grid
-from gaitshift.sim.terrain.kind import Kind, Quantity, spell
+from gaitshift.sim.terrain.kind import FINE_CELL, Grid, Kind, Quantity, spell
 
 HEIGHT = Quantity(name="height", unit="m", low=0.0, high=0.5)
 
@@ -266,7 +265,7 @@ def test_a_controller_is_one_file_and_one_line(copy):
     copy.add_file("control/statue.py", STATUE)
     registry = '    "cpg": "gaitshift.control.cpg:CpgController",\n'
     copy.add_line(
-        "control/controllers.py", registry, '    "statue": "gaitshift.control.statue:Statue",'
+        "control/controller.py", registry, '    "statue": "gaitshift.control.statue:Statue",'
     )
     few = ["--controller", "statue", "--seconds", "1", "--json"]
     said = copy.python("-m", "gaitshift", "evaluate", "pronk", *few, "--episodes", "2")

@@ -7,7 +7,7 @@ import pytest
 
 from gaitshift.cli import main
 from gaitshift.control import CONTROLLERS, Controller, Driver
-from gaitshift.control.controllers import controller_maker
+from gaitshift.control.controller import controller_maker
 from gaitshift.control.cpg import CpgController
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log

@@ -10,9 +10,7 @@ from hypothesis import strategies as st
 
 from gaitshift.cli import main
 from gaitshift.control import Autonomous
-from gaitshift.control.cpg import GAITS, CpgController, HopfNetwork, joint_angles
-from gaitshift.control.cpg.kinematics import lift_torques
-from gaitshift.control.cpg.oscillators import phase_of
+from gaitshift.control.cpg import GAITS, CpgController, HopfNetwork, phase_of
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait.gaits import load
 from gaitshift.lab.evaluation.evaluate import grounds_of
@@ -20,7 +18,7 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.robot.legs import LEGS
+from gaitshift.robot.legs import LEGS, joint_angles, lift_torques
 from gaitshift.shift import Rule, TouchdownSurprise, there_and_back
 from gaitshift.sim.terrain import from_spec
 from gaitshift.sim.world import World

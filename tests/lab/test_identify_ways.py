@@ -20,7 +20,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification import ParameterGrid, Tally, choose, passages
 from gaitshift.lab.identification.candidates import BETAS, CANDIDATES
 from gaitshift.lab.identification.chatter import chattered, shifts
-from gaitshift.lab.identification.ground import align_to_entry
+from gaitshift.lab.identification.labelled_run import align_to_entry
 from gaitshift.lab.identification.passage import best_beta, passage_grid, passage_scores
 from gaitshift.lab.identification.report import (
     condition_cells,

@@ -9,7 +9,7 @@ import pytest
 
 import gaitshift.control.policies
 from gaitshift.cli import main
-from gaitshift.control.cpg.oscillators import GAITS
+from gaitshift.control.cpg import GAITS
 from gaitshift.lab.log import Log
 
 TROT = Path(gaitshift.control.policies.__path__[0]) / "trot.onnx"

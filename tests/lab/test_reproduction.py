@@ -10,13 +10,13 @@ from gaitshift.control.observation import PAPER_SLICES
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.reproduction.findings import findings
+from gaitshift.lab.reproduction.judging import curve_rows, run_rows
 from gaitshift.lab.reproduction.learning_curve import LearningCurve, median_iteration
 from gaitshift.lab.reproduction.plan import ABLATIONS, AS_IN_THE_PAPER, REFERENCE, Plan
 from gaitshift.lab.reproduction.results import EarlierRuns, Results, Seeds
-from gaitshift.lab.reproduction.tables import curve_rows, run_rows
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import Run
-from gaitshift.show.plots.learning import Landmarks, comparison_curves, reward_curves
+from gaitshift.show.plots.reproduction import Landmarks, comparison_curves, reward_curves
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.table import write

@@ -17,7 +17,7 @@ from gaitshift.robot.description import ANYMAL_B
 from gaitshift.show.plots import gait_colours
 from gaitshift.show.video import VideoUnavailable, render
 from gaitshift.show.video.canvas import Ball, Camera, Canvas, follow
-from gaitshift.show.video.film import FilmWriter
+from gaitshift.show.video.render import FilmWriter
 from gaitshift.show.video.scene import SUN, Paint, build_scene
 from gaitshift.show.video.strip import Reading, Strip
 from gaitshift.sim.terrain import flat, from_spec

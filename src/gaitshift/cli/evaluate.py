@@ -11,7 +11,7 @@ import tyro
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy as policies
-from gaitshift.control.controllers import controller_maker
+from gaitshift.control.controller import controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.lab.evaluation import (

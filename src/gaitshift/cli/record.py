@@ -13,7 +13,7 @@ from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import Controller
 from gaitshift.control import policy as policies
-from gaitshift.control.controllers import controller_maker
+from gaitshift.control.controller import controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gaitshift.control import Controller, policy
-from gaitshift.control.controllers import ControllerMaker, controller_maker
+from gaitshift.control.controller import ControllerMaker, controller_maker
 from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.description import ANYMAL_B, Robot

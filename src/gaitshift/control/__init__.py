@@ -1,8 +1,8 @@
 """Controllers of robots: policies and oscillators, and switchers that change their gaits."""
 
+from gaitshift.control.controller import CONTROLLERS as CONTROLLERS
 from gaitshift.control.controller import Controller as Controller
 from gaitshift.control.controller import Repertoire as Repertoire
-from gaitshift.control.controllers import CONTROLLERS as CONTROLLERS
 from gaitshift.control.driver import Driver as Driver
 from gaitshift.control.policy import Policy as Policy
 from gaitshift.control.switcher import Autonomous as Autonomous

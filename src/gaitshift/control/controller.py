@@ -1,7 +1,8 @@
-"""What drives robots, learned or not, and the gaits that it knows."""
+"""What drives robots, learned or not, the gaits that it knows, and controllers by their names."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pkgutil import resolve_name
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -105,3 +106,35 @@ class Controller(Protocol):
     def value(self) -> Float[np.ndarray, " N"] | None:
         """Value of its critic at the observation of the last action; None without a critic."""
         ...
+
+
+@runtime_checkable
+class ControllerMaker(Protocol):
+    """Makes a controller of n robots, all in the first of the gaits."""
+
+    def __call__(self, gaits: Sequence[str], n: int, *, robot: Robot | None = None) -> Controller:
+        """`gaits` are names, or files that the controller reads; `robot` is ANYmal B by default.
+
+        Raises:
+            GaitshiftError: a gait is unknown, or the controller cannot drive this robot.
+        """
+        ...
+
+
+CONTROLLERS = {
+    "policy": "gaitshift.control.driver:Driver.load",
+    "cpg": "gaitshift.control.cpg:CpgController",
+}
+"""Makers of controllers: trained policies, and oscillators that learned nothing. A new controller
+is a file, and its line here. A maker is imported when it is asked for."""
+
+
+def controller_maker(name: str) -> ControllerMaker:
+    """The maker of this name.
+
+    Raises:
+        GaitshiftError: there is none.
+    """
+    if name not in CONTROLLERS:
+        raise GaitshiftError(known_names("controller", name, tuple(CONTROLLERS)))
+    return resolve_name(CONTROLLERS[name])

@@ -1,13 +1,14 @@
-"""The order of the legs, their pairs and their contact patterns.
+"""The order of the legs, their pairs and contact patterns, and the kinematics of ANYmal B's legs.
 
 Every array whose axis is the leg follows `LEGS`; every array whose axis is the joint follows
 `LEGS` × `JOINTS`. A contact pattern is one integer, its label: bit i is set where leg i touches.
+The kinematics are in closed form, with the lengths of ANYmal B's model.
 """
 
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 LEGS = ("FL", "FR", "BL", "BR")
 """Front left, front right, back left, back right (LF, RF, LH, RH in ANYbotics' names)."""
@@ -35,3 +36,65 @@ def label_of(contact: Bool[np.ndarray, "*batch 4"]) -> Int[np.ndarray, "*batch"]
 def contact_of(label: Int[np.ndarray, "*batch"]) -> Bool[np.ndarray, "*batch 4"]:
     """Contact booleans of a label: the inverse of `label_of`."""
     return (np.asarray(label)[..., None] & _BITS) != 0
+
+
+HIP_X, HIP_Y = 0.277, 0.116
+"""Where the abduction axis lies, from the base origin [m]."""
+
+THIGH_X, LEG_Y = 0.0635, 0.13
+"""From there: the flexion axis, and how far outside the leg's plane lies [m]."""
+
+THIGH = 0.25
+"""From the flexion axis to the knee [m]."""
+
+SHANK_X, SHANK_Z = 0.1, 0.298
+"""From the knee to the middle of the foot: ahead (at hind legs behind), and below [m]."""
+
+SHANK = float(np.hypot(SHANK_X, SHANK_Z))
+BEND = float(np.arctan2(SHANK_X, SHANK_Z))
+"""Length of that way [m], and its angle from the shank's own axis [rad]."""
+
+FORE = np.array([1.0, 1.0, -1.0, -1.0])
+SIDE = np.array([1.0, -1.0, 1.0, -1.0])
+"""Front or hind, left or right, in the order of `LEGS`."""
+
+
+def joint_angles(foot: Float[np.ndarray, "N 4 3"]) -> Float[np.ndarray, "N 12"]:
+    """Joint angles [rad] that bring the middle of each foot to a point in the body frame [m].
+
+    Knees point towards each other, as in the stance. Points out of reach are drawn in to the
+    nearest that is in reach.
+    """
+    x = foot[..., 0] - FORE * (HIP_X + THIGH_X)
+    y = foot[..., 1] - SIDE * HIP_Y
+    z = foot[..., 2]
+    depth = np.sqrt(np.maximum(y * y + z * z - LEG_Y * LEG_Y, 1e-6))
+    abduction = np.arctan2(y, -z) - np.arctan2(SIDE * LEG_Y, depth)
+    length = np.clip(np.hypot(x, depth), abs(SHANK - THIGH) + 1e-3, THIGH + SHANK - 1e-3)
+    cosine = (length * length - THIGH * THIGH - SHANK * SHANK) / (2.0 * THIGH * SHANK)
+    knee = -FORE * np.arccos(np.clip(cosine, -1.0, 1.0))
+    flexion = np.arctan2(-x, depth) - np.arctan2(SHANK * np.sin(knee), THIGH + SHANK * np.cos(knee))
+    angles = np.stack([abduction, flexion, knee + FORE * BEND], axis=-1)
+    return angles.reshape(*foot.shape[:-2], 12)
+
+
+def lift_torques(
+    angles: Float[np.ndarray, "N 12"], force: Float[np.ndarray, "N 4"]
+) -> Float[np.ndarray, "N 12"]:
+    """Joint torques [N·m] with which legs at these angles bear a force along body z [N] each.
+
+    By virtual work: τ = −f ∂z/∂q.
+    """
+    abduction, flexion, knee = np.moveaxis(angles.reshape(*angles.shape[:-1], 4, 3), -1, 0)
+    bent = flexion + knee - FORE * BEND
+    depth = THIGH * np.cos(flexion) + SHANK * np.cos(bent)
+    shank = np.cos(abduction) * SHANK * np.sin(bent)
+    rise = np.stack(
+        [
+            SIDE * LEG_Y * np.cos(abduction) + depth * np.sin(abduction),
+            np.cos(abduction) * THIGH * np.sin(flexion) + shank,
+            shank,
+        ],
+        axis=-1,
+    )
+    return (-force[..., None] * rise).reshape(angles.shape)

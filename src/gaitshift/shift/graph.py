@@ -12,8 +12,7 @@ from jaxtyping import Bool, Float, Int
 from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import Proprioception
-from gaitshift.shift.modulation import Modulation
-from gaitshift.shift.rule import Rule
+from gaitshift.shift.rule import Modulation, Rule
 from gaitshift.shift.statistic import begun_anew
 from gaitshift.shift.statistics import Watched, watch
 

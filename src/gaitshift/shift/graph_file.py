@@ -7,8 +7,7 @@ from typing import Any
 from gaitshift.data import Table, known_names, located, tables_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.shift.graph import Edge, GaitGraph
-from gaitshift.shift.modulation import Modulation
-from gaitshift.shift.rule import WHENS, Rule
+from gaitshift.shift.rule import WHENS, Modulation, Rule
 from gaitshift.shift.statistics import STATISTICS, Watched
 
 DEFAULT = "terrain"

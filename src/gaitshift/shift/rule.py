@@ -1,7 +1,8 @@
-"""The paper's counter k over any statistic: how it grows, and when it fires."""
+"""The paper's counter k over any statistic: how it grows, when it fires, and α modified online."""
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.state import Proprioception
 
 WHENS = ("above", "below")
 """What a rule counts: values above α, as on rough ground, or steps with all values below α."""
@@ -86,3 +88,38 @@ class Rule:
     def soonest(self, width: int, period: float = CONTROL_PERIOD) -> float:
         """Shortest time to exceed β [s]: `delay` where all `width` values of a statistic count."""
         return self.delay(width if self.when == "above" else 1, period)
+
+
+QUANTITIES = ("speed", "time")
+"""Quantities on which α may depend: the commanded forward speed [m/s], or the time [s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Modulation:
+    """A factor on α, linear between given points and constant beyond them."""
+
+    of: Literal["speed", "time"]
+    """The quantity on which it depends."""
+    points: tuple[tuple[float, float], ...]
+    """Pairs of a speed [m/s] or time [s], rising, and the factor there."""
+
+    def __post_init__(self) -> None:
+        if self.of not in QUANTITIES:
+            raise GaitshiftError(f"α over: 'of' must be {' or '.join(QUANTITIES)}, got {self.of!r}")
+        if not self.points or any(b[0] <= a[0] for a, b in pairwise(self.points)):
+            raise GaitshiftError(
+                f"α over {self.of}: points must be pairs with rising {self.of}s, such as "
+                f"[[0.4, 0.8], [1.2, 1.0]], got {list(map(list, self.points))}"
+            )
+        if not all(np.isfinite(x) and factor > 0 for x, factor in self.points):
+            raise GaitshiftError(
+                f"α over {self.of}: factors must be above 0 and {self.of}s finite, got "
+                f"{list(map(list, self.points))}"
+            )
+
+    def factor(self, sensed: Proprioception) -> Float[np.ndarray, " N"]:
+        """Present factor on each robot's α."""
+        at, factors = zip(*self.points, strict=True)
+        if self.of == "time":
+            return np.full(len(sensed.contact), float(np.interp(sensed.time, at, factors)))
+        return np.interp(sensed.need("forward_speed_command", "α over speed"), at, factors)

@@ -5,8 +5,7 @@ from typing import Any
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.shift.graph import Edge, GaitGraph
-from gaitshift.shift.modulation import Modulation
-from gaitshift.shift.rule import Rule
+from gaitshift.shift.rule import Modulation, Rule
 from gaitshift.shift.statistics import Watched
 
 NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "leak_back", "epsilon", "hold")

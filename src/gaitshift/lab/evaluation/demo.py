@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from gaitshift.control import Autonomous, Scheduled, Switcher
-from gaitshift.control.controllers import ControllerMaker, controller_maker
+from gaitshift.control.controller import ControllerMaker, controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log

@@ -1,16 +1,188 @@
-"""All figures of a log at once: what `gaitshift evaluate` prints."""
+"""All figures of a log, of base, joints and feet: what `gaitshift evaluate` prints."""
 
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from jaxtyping import Bool, Float
+
 from gaitshift.gait import RewardMachine
-from gaitshift.lab.gait_analysis.base import base_figures, lateral_error
-from gaitshift.lab.gait_analysis.feet import feet_figures
 from gaitshift.lab.gait_analysis.naming import gait_scores, name_gait
+from gaitshift.lab.gait_analysis.phase import Phases, axial_of
 from gaitshift.lab.gait_analysis.sample import WARM_UP, Sample
 from gaitshift.lab.gait_analysis.verdict import checks
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
+from gaitshift.robot.state import GRAVITY
+
+_SHORTEST_DRIFT = 0.5
+"""Robots that fall sooner after the warm-up have no drift [s]."""
+
+Figure = float | None
+"""None: nothing to measure."""
+
+
+def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
+    """The figures of `measure` for base and joints of this robot."""
+    log, alive = sample.log, sample.alive
+    if sample.steps == 0:
+        return dict.fromkeys(_NAMES)
+    sensed = log.sensed
+    command = sensed.need("forward_speed_command", "gait figures")[alive]
+    speed = log.truth.forward_speed[alive]
+    mean = float(speed.mean(dtype=float))
+    joint_speed = sensed.need("joint_velocity", "gait figures")[alive]
+    power = sensed.power[alive]
+    turn = sensed.need("angular_velocity_b", "gait figures")[..., :2][alive]
+    too_fast = np.abs(joint_speed).max(axis=-1) > robot.velocity_limit
+    height = sensed.base_height[alive]
+    values = (
+        mean,
+        abs(mean - float(command.mean())),
+        float(np.sqrt(np.square(speed - command).mean())),
+        _heading_drift(sample),
+        float(sensed.yaw[alive].std()),
+        float(power.mean(dtype=float)) / (robot.mass * GRAVITY * max(abs(mean), 1e-3)),
+        mean**2 / (GRAVITY * max(float(np.median(height)), 1e-3)),
+        float(turn[:, 0].std(dtype=float)),
+        float(turn[:, 1].std(dtype=float)),
+        float(too_fast.mean()),
+    )
+    return dict(zip(_NAMES, values, strict=True))
+
+
+_NAMES = (
+    "speed_mean",
+    "speed_error",
+    "speed_rmse",
+    "heading_drift",
+    "heading_error_sd",
+    "cost_of_transport",
+    "froude",
+    "roll_rate_sd",
+    "pitch_rate_sd",
+    "overspeed",
+)
+
+
+def lateral_error(log: Log) -> Figure:
+    """95th percentile over robots on their feet of their final distance from their line [m]."""
+    upright = ~log.fallen[-1]
+    if not upright.any():
+        return None
+    return float(
+        np.quantile(
+            np.abs(
+                log.truth.base_position_w[-1, upright, 1] - log.truth.base_position_w[0, upright, 1]
+            ),
+            0.95,
+        )
+    )
+
+
+def _heading_drift(sample: Sample) -> Figure:
+    """Root mean square over the robots of their mean yaw rate less the commanded one [rad/s].
+
+    A robot that needs a constant command to walk straight drifts by it, though it keeps its line.
+    """
+    last = sample.alive.sum(axis=0) - 1
+    long_enough = np.flatnonzero(last * sample.period >= _SHORTEST_DRIFT)
+    if long_enough.size == 0:
+        return None
+    end = last[long_enough]
+    heading = np.unwrap(sample.log.sensed.yaw[:, long_enough].astype(float), axis=0)
+    turned = heading[end, np.arange(len(end))] - heading[0]
+    asked_for = sample.log.sensed.need("yaw_rate_command", "gait figures")[:, long_enough]
+    commanded = asked_for.cumsum(axis=0) * sample.period
+    asked = commanded[end, np.arange(len(end))] - commanded[0]
+    return float(np.sqrt(np.square((turned - asked) / (end * sample.period)).mean()))
+
+
+PerFoot = list[float] | None
+"""Values in the order of `LEGS`; None: nothing to measure."""
+
+
+def feet_figures(
+    sample: Sample, machines: Mapping[str, RewardMachine]
+) -> dict[str, Figure | PerFoot | list[Figure]]:
+    """The figures of `measure` for feet and machines."""
+    steps, contact = sample.steps, sample.contact
+    cycles = sample.entries(machines)
+    whole = _whole_cycles(cycles)
+    machine = machines[sample.gait()]
+    phases = Phases.of(sample.touchdowns, sample.period)
+    moments = phases.moments(axial_of(machine))
+    phase = np.angle(moments) / (2 * np.pi) % 1.0 / np.array(axial_of(machine))
+    known = [fraction.size > 0 for fraction in phases.fractions]
+    return {
+        "slip": _slip(sample),
+        "pattern_fraction": float(sample.log.stance_shown[sample.alive].mean()) if steps else None,
+        "cycles_per_s": float(cycles.sum() / (steps * sample.period)) if steps else None,
+        "touchdowns_per_cycle": _touchdowns_per_cycle(sample, machines, cycles, whole),
+        "phase": _where(known, phase),
+        "phase_consistency": _where(known, np.abs(moments)),
+        "duty_factor": _duty_factor(sample, whole) if steps else None,
+        "clearance": [_clearance(sample, leg) for leg in range(4)],
+        "flight_fraction": float((sample.alive & ~contact.any(axis=2)).sum() / steps)
+        if steps
+        else None,
+    }
+
+
+def _where(known: list[bool], values: Float[np.ndarray, " 4"]) -> list[Figure]:
+    return [float(value) if there else None for there, value in zip(known, values, strict=True)]
+
+
+def _whole_cycles(entry: Bool[np.ndarray, "T N"]) -> Bool[np.ndarray, "T N"]:
+    """Where each robot is between its first and its last entry into a cycle.
+
+    Figures over whole cycles only: a partial cycle at either end would count some feet more often.
+    """
+    before = entry.cumsum(axis=0) - entry
+    return (before >= 1) & (before < entry.sum(axis=0))
+
+
+def _touchdowns_per_cycle(
+    sample: Sample,
+    machines: Mapping[str, RewardMachine],
+    entry: Bool[np.ndarray, "T N"],
+    whole: Bool[np.ndarray, "T N"],
+) -> PerFoot:
+    """Onsets over the touchdowns of the machine in whole cycles."""
+    counts = np.bincount(sample.log.gait[entry & whole], minlength=len(sample.log.gaits))
+    expected = counts @ np.array([machines[name].touchdowns for name in sample.log.gaits])
+    if not expected.all():
+        return None
+    return ((sample.onsets & whole[..., None]).sum(axis=(0, 1)) / expected).tolist()
+
+
+def _duty_factor(sample: Sample, whole: Bool[np.ndarray, "T N"]) -> list[float]:
+    """Share of the steps of whole cycles that each foot is down; of all steps without a cycle."""
+    taken = whole if whole.any() else sample.alive
+    down = (sample.contact & taken[..., None]).sum(axis=(0, 1))
+    return (down / taken.sum()).tolist()
+
+
+def _clearance(sample: Sample, leg: int) -> Figure:
+    """Median over the strides of a foot, touchdown to touchdown, of its greatest height [m]."""
+    steps = len(sample.log.time)
+    at = np.flatnonzero(sample.touchdowns[:, :, leg].T.ravel())
+    if at.size < 2:
+        return None
+    heights = np.where(sample.alive, sample.log.truth.clearance[:, :, leg], -np.inf).T.ravel()
+    highest = np.maximum.reduceat(heights, at)[:-1]
+    one_robot = np.diff(at // steps) == 0
+    return float(np.median(highest[one_robot])) if one_robot.any() else None
+
+
+def _slip(sample: Sample) -> Figure:
+    """Mean horizontal speed of feet that are down in two successive steps [m/s]."""
+    position = sample.log.truth.foot_position_w[..., :2]
+    both = sample.contact[1:] & sample.contact[:-1]
+    if not both.any():
+        return None
+    speed = np.linalg.norm(np.diff(position, axis=0)[both], axis=-1) / sample.period
+    return float(speed.mean(dtype=float))
 
 
 def measure(

@@ -21,8 +21,7 @@ from gaitshift.lab.identification.firings import (
     join_by_name,
     steps_alive,
 )
-from gaitshift.lab.identification.ground import align_to_entry
-from gaitshift.lab.identification.labelled_run import LabelledRun
+from gaitshift.lab.identification.labelled_run import LabelledRun, align_to_entry
 from gaitshift.lab.identification.passage import longest_passage, passage_scores
 from gaitshift.lab.identification.statistics import auc, auc_interval
 from gaitshift.lab.identification.tuning import Tuned

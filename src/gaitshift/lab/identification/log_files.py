@@ -9,8 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.ground import rough_ground
-from gaitshift.lab.identification.labelled_run import LabelledRun, Way
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way, rough_ground
 from gaitshift.lab.log import Log
 from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
 from gaitshift.robot.legs import JOINTS, LEGS

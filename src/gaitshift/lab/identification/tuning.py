@@ -7,8 +7,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.candidates import BETAS, Candidate
 from gaitshift.lab.identification.choice import Choice, choose
 from gaitshift.lab.identification.firings import ParameterGrid, Tally, first_firings, join_by_name
-from gaitshift.lab.identification.ground import align_to_entry
-from gaitshift.lab.identification.labelled_run import LabelledRun, Way
+from gaitshift.lab.identification.labelled_run import LabelledRun, Way, align_to_entry
 from gaitshift.lab.identification.passage import GridScores, best_beta, passage_grid
 from gaitshift.shift import Rule
 

@@ -11,10 +11,9 @@ from jaxtyping import Bool, Float, Int
 from gaitshift.control import Autonomous, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.lab.evaluation.evaluate import grounds_of, starts
-from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.lab.evaluation.rollout import RolloutConfig, in_batches, rollout
 from gaitshift.lab.identification import is_rough, wilson
 from gaitshift.lab.log import Log
-from gaitshift.lab.studies.batches import in_batches
 from gaitshift.robot.state import GRAVITY, Privileged
 from gaitshift.shift import GaitGraph, between, load_graph
 from gaitshift.sim.world import World

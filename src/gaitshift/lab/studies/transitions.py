@@ -11,10 +11,9 @@ from gaitshift.control import Controller, Driver
 from gaitshift.control.policy import Policy
 from gaitshift.control.switcher import uncounted
 from gaitshift.lab.evaluation.evaluate import grounds_of, starts
-from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
+from gaitshift.lab.evaluation.rollout import RolloutConfig, in_batches, rollout
 from gaitshift.lab.identification import wilson
 from gaitshift.lab.log import Log
-from gaitshift.lab.studies.batches import in_batches
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 from gaitshift.shift import Decision

@@ -6,9 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.reproduction import tables
 from gaitshift.lab.reproduction.findings import Finding, findings
-from gaitshift.lab.reproduction.judging import JudgedPolicy, judge
+from gaitshift.lab.reproduction.judging import (
+    ABLATED_RUNS,
+    JudgedPolicy,
+    ablation_rows,
+    curve_rows,
+    gait_rows,
+    judge,
+    run_rows,
+)
 from gaitshift.lab.reproduction.learning_curve import HELD_FOR, WALKING_CHANGES, WALKING_SPEED
 from gaitshift.lab.reproduction.plan import LOCKOUT
 from gaitshift.lab.reproduction.results import (
@@ -50,12 +57,12 @@ def write_report(
     out.mkdir(parents=True, exist_ok=True)
     judged = judge(results, runs, earlier or EarlierRuns(), report)
     found = findings(results)
-    gaits, ablations = tables.gait_rows(judged), tables.ablation_rows(results)
+    gaits, ablations = gait_rows(judged), ablation_rows(results)
     parts = {
-        RUNS_FILE: tables.run_rows(results),
+        RUNS_FILE: run_rows(results),
         GAITS_FILE: gaits,
-        tables.ABLATED_RUNS: ablations,
-        CURVES_FILE: list(tables.curve_rows(results)),
+        ABLATED_RUNS: ablations,
+        CURVES_FILE: list(curve_rows(results)),
     }
     written = [name for name, rows in parts.items() if rows]
     for name in written:

@@ -86,7 +86,7 @@ class Curriculum:
     """The factor λ on all penalties, 0 to 1 (paper III-D, where it is always 1)."""
     mixed_starts: float = 0.0
     """The share of episodes that begin in the midst of a stride that is no gait's
-    (`gaitshift.sim.env.mixed_start`), of those that begin while others go on, 0 to 1."""
+    (`gaitshift.sim.env.episodes`), of those that begin while others go on, 0 to 1."""
 
     def __post_init__(self) -> None:
         for name in ("strictness", "command_scale", "penalty_scale", "mixed_starts"):

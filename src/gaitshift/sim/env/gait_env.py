@@ -16,11 +16,9 @@ from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import ACTION_LIMIT
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged
-from gaitshift.sim.env.commander import Commander
 from gaitshift.sim.env.config import Curriculum, EnvConfig
-from gaitshift.sim.env.mixed_start import MixedStart, mix
-from gaitshift.sim.env.swings import Swings
-from gaitshift.sim.reward import earned_bonus, walk_reward, with_bonus
+from gaitshift.sim.env.episodes import Commander, MixedStart, mix
+from gaitshift.sim.reward import Swings, earned_bonus, walk_reward, with_bonus
 from gaitshift.sim.terrain import Terrain
 from gaitshift.sim.world import Pusher, World
 

@@ -5,8 +5,7 @@ from gaitshift.sim.terrain.kind import Kind
 from gaitshift.sim.terrain.pebbles import pebbles
 from gaitshift.sim.terrain.perlin import perlin
 from gaitshift.sim.terrain.shapes import bank, flat, slope, stairs, step
-from gaitshift.sim.terrain.spec import KINDS, from_spec, spec_help
-from gaitshift.sim.terrain.track import sections_of, track
+from gaitshift.sim.terrain.spec import KINDS, from_spec, sections_of, spec_help, track
 
 __all__ = [
     "KINDS",

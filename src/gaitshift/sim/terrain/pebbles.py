@@ -4,9 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.sim.terrain.grid import FINE_CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.kind import Kind, Quantity, spell
+from gaitshift.sim.terrain.kind import FINE_CELL, Grid, Kind, Quantity, spell
 
 _HEIGHT = Quantity(name="height", unit="m", low=0.0, high=1.0)
 """Of the highest pebble."""

@@ -6,9 +6,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.sim.terrain.grid import CELL, FINE_CELL, Grid
 from gaitshift.sim.terrain.height_field import Terrain
-from gaitshift.sim.terrain.kind import Kind, Quantity, spell
+from gaitshift.sim.terrain.kind import CELL, FINE_CELL, Grid, Kind, Quantity, spell
 
 _INCLINE = Quantity(name="angle", unit="degrees", low=-45.0, high=45.0)
 """Of a slope. Ours: at 45° feet slip unless friction is above 1."""
