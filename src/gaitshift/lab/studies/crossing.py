@@ -229,7 +229,8 @@ def page(rows: Sequence[Row], command: str) -> str:
         "chattered",
     )
     parts = [
-        "# Does the shift help on rough ground?",
+        "# Do more robots survive on rough ground when they shift?",
+        _answer(rows),
         f"Robots cross {BEFORE:g} m of level ground, {NOISE:g} m of Perlin noise of one amplitude "
         f"and {AFTER:g} m of level ground: in one gait, in the other, with shifts by a condition, "
         "or with shifts by an oracle that knows where the noise is. Fields and starts are the same "
@@ -248,6 +249,14 @@ def page(rows: Sequence[Row], command: str) -> str:
             markdown(head, [_cells(row) for row in of]),
         ]
     return "\n\n".join(parts) + "\n"
+
+
+def _answer(rows: Sequence[Row]) -> str:
+    """How many robots survive on the roughest ground, in one sentence."""
+    largest = max(row["amplitude"] for row in rows)
+    of = [row for row in rows if row["amplitude"] == largest]
+    counts = ", ".join(f"{row['way']} {row['survived']} of {row['runs']}" for row in of)
+    return f"On noise of {largest:g} m these robots survive: {counts}."
 
 
 def _cells(row: Row) -> tuple[str, ...]:

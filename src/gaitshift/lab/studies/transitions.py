@@ -195,13 +195,13 @@ COLUMNS: dict[str, type] = {
 }
 """Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
 
-_INTRODUCTION = """# Gait shifts at a random phase
+TITLE = "Does a gait shift at a random phase succeed?"
 
-Policy and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds
-if the robot does not fall within 5 s and, from some stride on, the contacts match the new gait in
-at least half of the steps of every stride. Settle time ends with the first such stride. Dip is the
-largest drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 %
-Wilson intervals."""
+_INTRODUCTION = """Policy and reward machine are swapped at a random phase of the old gait's
+stride. A shift succeeds if the robot does not fall within 5 s and, from some stride on, the
+contacts match the new gait in at least half of the steps of every stride. Settle time ends with
+the first such stride. Dip is the largest drop of the mean speed of a stride below the slower of
+the two commands. Intervals are 95 % Wilson intervals."""
 
 HEAD = (
     "from",
@@ -249,17 +249,32 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
 
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
-    parts = [_INTRODUCTION, f"Made by `{command}`. The same as an [interactive page](page.html)."]
+    parts = [f"# {TITLE}", answer(rows), _INTRODUCTION]
+    parts.append(f"Made by `{command}`. The same as an [interactive page](page.html).")
     for ground in dict.fromkeys(row["ground"] for row in rows):
         of = [row for row in rows if row["ground"] == ground]
-        total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
         parts += [
             f"## {ground}",
-            f"{good} of {total} shifts succeeded.",
+            f"{succeeded(of)} shifts succeeded.",
             f"![Failed shifts on {ground}]({picture_of(ground)})",
             markdown(HEAD, [row_cells(row) for row in of]),
         ]
     return "\n\n".join(parts) + "\n"
+
+
+def answer(rows: Sequence[Row]) -> str:
+    """How many shifts succeeded on each ground, in one sentence."""
+    grounds = dict.fromkeys(row["ground"] for row in rows)
+    counts = ((ground, [row for row in rows if row["ground"] == ground]) for ground in grounds)
+    parts = [f"on `{ground}` {succeeded(of)} shifts succeed" for ground, of in counts]
+    text = ", and ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def succeeded(rows: Sequence[Row]) -> str:
+    """Number of shifts that succeeded, of all, as text."""
+    good, total = (sum(row[name] for row in rows) for name in ("successes", "switches"))
+    return f"{good} of {total}"
 
 
 def picture_of(ground: str) -> str:

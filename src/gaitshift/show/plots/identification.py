@@ -1,4 +1,4 @@
-"""What identification found: a map over α and β, and ROC curves side by side."""
+"""Results of an identification: a map over α and β, and ROC curves."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
@@ -37,7 +37,7 @@ LATEST = 6.0
 FALSE = "#f3d9c4"
 """Where robots shift that should not."""
 
-NOTICED = "true positive rate: passages to detect, with a shift"
+DETECTED = "true positive rate: passages to detect, with a shift"
 OTHERS = "false positive rate: other passages, with a shift"
 """Axes of a ROC curve."""
 
@@ -134,7 +134,7 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
         axes.set_xlim(-0.01, 1.0)
         axes.set_ylim(0.0, 1.01)
         axes.set_xlabel(OTHERS)
-        axes.set_ylabel(NOTICED)
+        axes.set_ylabel(DETECTED)
         axes.set_title(f"passages of 3 m, {course} against the rest", loc="left", fontsize=12)
         figure.tight_layout()
         figure.subplots_adjust(right=0.6)
