@@ -45,7 +45,7 @@ SEEDS_HEAD = """# Is the flat stage clean from fresh seeds?
 With {seeds} fresh seeds per gait, these policies are clean: {clean}.
 
 Each policy is trained by the flat stage of the default recipe alone ({iterations} iterations,
-{steps:.1f} million control steps, about six minutes on one core), with {seeds} seeds, starting at 1.
+{steps:.1f} million control steps, about six minutes on one core), for seeds 1 to {seeds}.
 It is judged on flat ground, with 64 robots for 12 s, by the limits of `gaitshift evaluate`. The
 speed loop of `evaluate` is on; the column *open loop* gives the mean speed without it.
 This page is made by `python tools/training_evidence.py seeds --seeds {seeds}`.
@@ -58,7 +58,7 @@ without {some}; and always clean without {always}.
 A trot is trained by the first {iterations} iterations of the default recipe, on flat ground: once
 with all additions, and once without each of the seven terms that the reward adds to the paper's
 Table I and each of the two factors of the bonus (`gaitshift.sim.reward.ADDITIONS`,
-`BONUS_SHARES`). The numbers are means over {seeds} seeds, starting at 1. Each policy is judged on flat
+`BONUS_SHARES`). The numbers are means over seeds 1 to {seeds}. Each policy is judged on flat
 ground, with 64 robots for 12 s. *Clean* counts the policies that keep all limits of `gaitshift
 evaluate`. *Worst touchdowns* are those of the foot that is furthest from one touchdown per cycle.
 This page is made by `python tools/training_evidence.py additions --seeds {seeds}`.

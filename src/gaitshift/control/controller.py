@@ -1,4 +1,4 @@
-"""What drives robots, learned or not, and the gaits that it knows."""
+"""The interface of controllers, learned or not, and their gaits."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -71,7 +71,7 @@ class Controller(Protocol):
     n: int
     """Robots."""
     repertoire: Repertoire
-    """The gaits that it knows."""
+    """The available gaits."""
     gait: Int[np.ndarray, " N"]
     """Index into the repertoire of the gait that each robot is in."""
 

@@ -27,8 +27,8 @@ CONTROLLERS = {
     "policy": "gaitshift.control.driver:Driver.load",
     "cpg": "gaitshift.control.cpg:CpgController",
 }
-"""Makers of controllers: trained policies, and oscillators that learned nothing. A maker is
-imported when it is asked for."""
+"""Makers of controllers: trained policies, and oscillators without learning. A maker is imported at
+its first use."""
 
 
 def controller_maker(name: str) -> ControllerMaker:

@@ -1,4 +1,4 @@
-"""Four Hopf oscillators a robot, coupled to keep the phases of a gait, and the gaits they know."""
+"""Four Hopf oscillators per robot, coupled to the phases of a gait, and the known gaits."""
 
 from dataclasses import dataclass
 
@@ -37,8 +37,8 @@ GAITS = {
         CpgGait(name="walk", frequency=1.2, duty=0.75, speed=0.3, clearance=0.09),
     )
 }
-"""By name; numbers found by trying on flat ground. The feet of one side, or of one end, tip the
-body like a pendulum: only fast short steps near its middle keep it level."""
+"""By name; ours: the numbers were tuned on flat ground. Feet of one side or one end tip the body
+like a pendulum, so that only fast, short steps near its middle keep it level."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,12 +27,12 @@ _BOUNDS = ("oracle", classifier.NAME)
 
 
 def condition_rows(judged: Sequence[Judged]) -> list[Row]:
-    """One row a condition: its numbers, and all courses together."""
+    """One row per condition: its numbers, and the results of all courses together."""
     return [_condition_row(one) for one in judged]
 
 
 def course_rows(judged: Sequence[Judged]) -> list[Row]:
-    """One row a condition and course."""
+    """One row per condition and course."""
     return [_course_row(one, course) for one in judged for course in one.courses]
 
 
@@ -44,14 +44,14 @@ def write_report(
     held_out: bool,
     pictures: Mapping[str, str],
 ) -> list[Row]:
-    """Writes it into `out`; gives the rows of the conditions.
+    """Writes the report into `out`; returns the rows of the conditions.
 
     Args:
         judged: the conditions.
         out: a folder that exists.
         command: what made it.
-        held_out: whether other logs judged than those that chose.
-        pictures: files in the folder, and a line on each.
+        held_out: whether the logs for judging differ from those for choosing.
+        pictures: files in the folder, with a caption each.
     """
     conditions, courses = condition_rows(judged), course_rows(judged)
     for name, rows in ((CONDITIONS, conditions), (COURSES, courses)):
@@ -126,7 +126,7 @@ def _cost(row: Row) -> float:
 
 
 def _area_words(choice: Choice) -> str:
-    """The β of the areas, and why it is another."""
+    """Description of the β at which areas are computed."""
     if choice.is_free is None:
         return "the given β (no area where k cannot exceed it within a passage)"
     return (
@@ -238,7 +238,7 @@ CONDITIONS_HEAD = (
     *("condition", "α", "β", "β [s]", "β [m]", "leak"),
     *("detected", "mean delay [m]", "false shifts", "chattered", "area", "at β"),
 )
-"""Above the cells of `condition_cells`."""
+"""Head of the table of `condition_cells`."""
 
 
 def condition_cells(row: Row) -> tuple[str, ...]:
@@ -263,7 +263,7 @@ COURSES_HEAD = (
     *("course", "detected", "delay [m]", "95 % within [m]", "delay [s]"),
     *("false shifts", "false shifts per km, 95 %", "chattered", "area", "at β"),
 )
-"""Above the cells of `course_cells`."""
+"""Head of the table of `course_cells`."""
 
 
 def course_cells(row: Row) -> tuple[str, ...]:

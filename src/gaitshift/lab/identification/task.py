@@ -15,7 +15,7 @@ from gaitshift.lab.identification.step_cache import Stamp, StepCache, stamp
 from gaitshift.lab.identification.tuning import Tried, Tuned, as_given, try_grids, tune
 
 ALL = "all"
-"""Stands for every condition that the logs feed."""
+"""Stands for every condition whose signals are in the logs."""
 
 
 @dataclass(frozen=True)

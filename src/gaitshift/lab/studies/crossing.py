@@ -21,10 +21,10 @@ from gaitshift.sim.world import World
 from gaitshift.table import Row, markdown
 
 BEFORE, NOISE, AFTER = 4.0, 15.0, 5.0
-"""Metres of level ground, of noise, and of level ground again, from the start to the finish."""
+"""Lengths of level ground, noise, and level ground again, from start to finish [m]."""
 
 PATIENCE = 2.0
-"""Time limit of the robots over the time that they need at the commanded speed."""
+"""Time limit, as a multiple of the time at the commanded speed."""
 
 BATCH = 256
 """Robots at a time, over eight fields of noise."""
@@ -74,7 +74,7 @@ class Crossings:
     cost_of_transport: Float[np.ndarray, " N"]
     """Energy Σ|τ q̇| dt over weight and distance; NaN for robots that walked less than a metre."""
     shifts: Int[np.ndarray, " N"]
-    """Changes of gait until then."""
+    """Changes of gait until the finish, the fall or the end."""
 
 
 def cross(
@@ -177,11 +177,11 @@ interval of a mean (95 % both)."""
 PICTURE = "crossings.png"
 
 ENOUGH = 2
-"""Shifts that one stretch of noise is worth; more are chatter."""
+"""Largest number of shifts per stretch of noise without chatter."""
 
 
 def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> Row:
-    """What came of the crossings of one way."""
+    """The results of the crossings of one way, as a row."""
     n, fell = len(crossings.fell), int(crossings.fell.sum())
     low, high = wilson(np.array([float(n - fell)]), np.array([float(n)]))
     cost = crossings.cost_of_transport

@@ -56,7 +56,7 @@ class Outcomes:
     fell: Bool[np.ndarray, " N"]
     """Whether the robot fell within `WATCHED` seconds."""
     settle: Float[np.ndarray, " N"]
-    """Time until the new gait is reached for good [s]; NaN where it never is."""
+    """Time until the new gait is reached and held [s]; NaN where it never is."""
     dip: Float[np.ndarray, " N"]
     """Largest drop of a stride's mean speed below the slower of the two commands [m/s]."""
     tilt: Float[np.ndarray, " N"]
@@ -174,7 +174,7 @@ def _phase(
 
 
 PHASES = 10
-"""Parts that the stride is cut into."""
+"""Number of equal parts of the stride."""
 
 COLUMNS: dict[str, type] = {
     "old": str,
@@ -193,7 +193,7 @@ COLUMNS: dict[str, type] = {
     "worst_phase": str,
     "worst_phase_success": float,
 }
-"""Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
+"""Columns of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
 
 TITLE = "Does a gait shift at a random phase succeed?"
 
@@ -214,11 +214,11 @@ HEAD = (
     "tilt, 95 % within [°]",
     "worst phase",
 )
-"""Above the cells of `row_cells`."""
+"""Head of the table of `row_cells`."""
 
 
 def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
-    """What came of the shifts of a pair."""
+    """The results of the shifts of a pair, as a row."""
     n, good = len(outcomes.success), int(outcomes.success.sum())
     low, high = wilson(np.array([float(good)]), np.array([float(n)]))
     settled = outcomes.settle[outcomes.success]

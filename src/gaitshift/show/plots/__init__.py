@@ -1,4 +1,4 @@
-"""Figures of logs and trainings, as files to look at."""
+"""Figures of logs and trainings as files."""
 
 from gaitshift.show.plots.contacts import contact_diagram as contact_diagram
 from gaitshift.show.plots.demo import demo_figure as demo_figure

@@ -1,4 +1,4 @@
-"""The contact diagram: which feet stood when, after Hildebrand."""
+"""The contact diagram after Hildebrand: when each foot is down."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
@@ -48,7 +48,7 @@ def contact_diagram(
 
 
 def _write_gaits(axes: Axes, log: Log, robot: int) -> None:
-    """The names of the gaits above the bars, each where it is in force."""
+    """The names of the gaits above the bars, each over its time."""
     colours = gait_colours(log.gaits)
     for name, span in gait_spans(log, robot):
         axes.text(
@@ -64,7 +64,7 @@ def _write_gaits(axes: Axes, log: Log, robot: int) -> None:
 
 
 def _write_shares(axes: Axes, log: Log, robot: int) -> None:
-    """How long each foot stood, right of its lane."""
+    """The duty factor of each foot, right of its lane."""
     right = axes.get_xlim()[1]
     for leg, share in enumerate(log.sensed.contact[:, robot].mean(axis=0)):
         axes.annotate(
