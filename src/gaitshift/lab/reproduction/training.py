@@ -163,7 +163,7 @@ def _interrupts_ignored() -> Generator[None]:
 
 
 def _end_with_parent() -> None:
-    """Ends all processes with the command, even if it is killed."""
+    """Ends this process when the command ends, even if the command is killed."""
     parent = multiprocessing.parent_process()
     assert parent is not None
 

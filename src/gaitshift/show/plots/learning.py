@@ -1,4 +1,4 @@
-"""How runs learn, several seeds to a line: rewards beside the paper's, speeds side by side."""
+"""Learning curves, averaged over seeds: rewards beside the paper's, and speeds by setting."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
@@ -25,21 +25,21 @@ from gaitshift.show.plots.style import (
 )
 
 Courses = Sequence[Float[np.ndarray, " _"]]
-"""One quantity over the iterations, an array a seed; a run that broke down has a shorter one."""
+"""One quantity over the iterations, an array per seed; that of a diverged run is shorter."""
 
 _SIZE = (7.5, 4.9)
-"""Of the rewards [inch]."""
+"""Size of the figure of rewards [inch]."""
 
 _PANEL = (3.75, 2.6)
-"""Of one comparison [inch]."""
+"""Size of one comparison [inch]."""
 
 _COMPARED = (INK, "#0072b2", "#d55e00")
-"""Colours of what is compared, the reference first."""
+"""Colours of the settings, the reference first."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Landmarks:
-    """What another's curves look like, in a few numbers."""
+    """Landmarks of published curves."""
 
     start: float
     """Reward at the first iteration."""
@@ -100,10 +100,10 @@ def reward_curves(rewards: Mapping[str, Courses], landmarks: Landmarks, path: Pa
 def comparison_curves(
     panels: Mapping[str, Mapping[str, Courses]], path: Path, *, aim: float
 ) -> Figure:
-    """Draws the speed of each setting over the iterations [m/s], a panel a question.
+    """Draws the speed of each setting over the iterations [m/s], one panel per question.
 
-    Lines are means over seeds, bands from the least to the greatest; dashed is the speed aimed at.
-    The first setting of a panel is the one that the others are held against.
+    Lines are means over seeds, bands from the least to the greatest; the dashed line is the
+    commanded speed. The first setting of a panel is its reference.
 
     Raises:
         GaitshiftError: another file ending, or no such folder.

@@ -20,11 +20,11 @@ from gaitshift.show.plots.learning import Courses, Landmarks, comparison_curves,
 REWARDS, COMPARISONS = "reward.png", "ablations.png"
 
 CONTACT_TIME = 2.0
-"""Length of a contact diagram [s], as in the paper's."""
+"""Length of a contact diagram [s], as in the paper."""
 
 
 def draw(results: Results, judged: list[JudgedPolicy], out: Path) -> list[str]:
-    """Draws what there is to draw into `out`; gives the names of the files."""
+    """Draws all available figures into `out`; returns the names of the files."""
     drawn: list[str] = []
     rewards = {gait: _columns(seeds, "reward") for gait, seeds in results.gaits()}
     rewards = {gait: curves for gait, curves in rewards.items() if curves}
@@ -74,5 +74,5 @@ def _panels(results: Results) -> Mapping[str, Mapping[str, Courses]]:
 
 
 def _columns(seeds: Seeds, column: str) -> Courses:
-    """One column of every run that has a curve at all."""
+    """One column of every run that has a curve."""
     return [getattr(curve, column) for curve in seeds.curves if len(curve)]

@@ -36,10 +36,10 @@ def write_report(
     earlier: EarlierRuns | None = None,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Writes all that the runs at hand say into `out`; gives the same as plain data.
+    """Writes the report of the finished runs into `out`; returns the same as plain data.
 
     Args:
-        results: the runs that are over.
+        results: the finished runs.
         runs: their folders.
         out: the folder of the report.
         earlier: runs in the tables of an earlier report, whose folders may be gone.

@@ -29,7 +29,7 @@ _PASSAGES = {
     "rough": "rough ground against others",
     "flat": "level ground against rough ground",
 }
-"""What ROC curves are about, by the way."""
+"""Passages of the ROC curves, by the way."""
 
 _FALSE = Category(name="false shifts", colour=FALSE)
 _MISSED = Category(name="most passages missed", colour="pale")
@@ -38,7 +38,7 @@ _MISSED = Category(name="most passages missed", colour="pale")
 def write_identification_page(
     judged: Sequence[Judged], path: Path, *, title: str, words: str, command: str
 ) -> None:
-    """Writes the page of an identification: ROC curves, and a map and a table a condition.
+    """Writes the page of an identification: ROC curves, and a map and a table per condition.
 
     Args:
         judged: the conditions.
@@ -74,7 +74,7 @@ def write_identification_page(
 
 
 def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> None:
-    """Writes the page of shifts: a map and a table a ground.
+    """Writes the page of shifts: a map and a table per ground.
 
     Args:
         rows: of the table of shifts (`studies.transitions.row_of`).
