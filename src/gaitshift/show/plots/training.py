@@ -37,7 +37,7 @@ COURSES = (
 _NEEDED = ("iteration", "stage", "steps", "wall_s", *(column for column, _, _ in COURSES))
 
 _LIMITS = {"survival": (-4.0, 104.0)}
-"""Ends of the scale where the course does not give them."""
+"""Fixed ends of the scale, by column."""
 
 _SIZE = (7.5, 8.4)
 """[inch]"""

@@ -1,4 +1,4 @@
-"""MP4 files: pictures in, by the ffmpeg that imageio brings."""
+"""MP4 files from pictures, by the ffmpeg of imageio."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -14,7 +14,7 @@ _QUALITY = 25
 """x264's constant rate factor."""
 
 _RATE = 900
-"""Most kilobits a second: 30 s stay below 4 MB."""
+"""Largest bit rate [kbit/s]: 30 s stay below 4 MB."""
 
 
 class FilmWriter:
