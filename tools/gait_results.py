@@ -30,38 +30,39 @@ HEAD = """# Are the shipped gaits what their names say, and clean?
 {clean} of {count} shipped policies walk in the gait of their name, judged by their contacts alone,
 and are clean.
 
-Flat ground, {episodes} robots for {seconds:g} s, no exploration, the gait's nominal speed and
-frequency, the first 2 s left out. `gaitshift.gait_analysis` defines the figures. This page is made
-by `tools/gait_results.py` from the records beside the policies.
+The figures are those of {episodes} robots on flat ground for {seconds:g} s, without exploration,
+at the nominal speed and frequency of the gait; the first 2 s are left out.
+`gaitshift.lab.gait_analysis` defines the figures. This page is made by `tools/gait_results.py`
+from the records beside the policies.
 
 - *Clean*: the contacts are those of the gait, and every limit is kept. Trot, pace and bound have
-  stricter limits than the others (`src/gaitshift/lab/gait_analysis/verdict.py`). The others have
-  none on noise of 0.15 m and more, slopes, stairs and steps
+  stricter limits than the other gaits (`src/gaitshift/lab/gait_analysis/verdict.py`). The other
+  gaits have no limits on noise of 0.15 m and more, slopes, stairs and steps
   (`src/gaitshift/lab/evaluation/trials.py`).
-- *Cycles*: rounds of the machine a second.
+- *Cycles*: cycles of the machine per second.
 - *Pattern*: the share of control steps whose contacts are a stance of the gait.
-- *Touchdowns*: onsets of contact over those that the machine asks for in a cycle; 1 without
-  chatter.
+- *Touchdowns*: touchdowns of a foot per touchdown of the machine's cycle; 1 without chatter.
 - *Cost of transport*: mean Σ|τ q̇| / (m g v), mechanical.
 """
 
 TRAINING = """## Training
 
-The policies come from more than one recipe and seed. The records beside them name both, and
-`make policies` trains by them ([both recipes](training-recipe.md)).
+The policies come from two recipes and two seeds. The record beside each policy names its recipe
+and seed, and `make policies` trains by these records ([both recipes](training-recipe.md)).
 """
 
 TRIALS = """## Trials
 
-{pushed} robots with pushes on flat ground, {episodes} on each other ground. *Distance share*: the
-distance covered over the commanded one. *Lateral error*: the 95th percentile over the robots. A
-value that misses its limit is in bold. [Stairs and steps](edges.md) have a page of their own.
+{pushed} robots walk with pushes on flat ground, and {episodes} on each other ground. *Distance
+share* is the distance covered, as a share of the commanded distance. *Lateral error* is the 95th
+percentile over the robots. A value that misses its limit is in bold. [Stairs and steps](edges.md)
+have a page of their own.
 """
 
 COMMANDS = """## Commands
 
-Speeds over their range at the gait's own stride frequency, then frequencies at its own speed: the
-command → the measured value on flat ground (`gaitshift evaluate GAIT --commands`).
+Each entry is a command → the measured value on flat ground (`gaitshift evaluate GAIT --commands`).
+Speeds are tried at the gait's nominal stride frequency, and frequencies at its nominal speed.
 """
 
 
@@ -150,7 +151,7 @@ def _trials(records: dict[str, Any]) -> str:
 
 
 def _commands(records: dict[str, Any]) -> str:
-    """One row a gait: what was asked for and what came of it."""
+    """One row per gait: commands and measured values."""
     rows = []
     for name, record in records.items():
         asked = record["evaluation"]["commands"]

@@ -1,11 +1,11 @@
-"""Makes the pages below docs/results/shifting anew, from the policies that are shipped.
+"""Makes the pages in the folders of docs/results/shifting, from the shipped policies.
 
 Usage: python tools/shifting_evidence.py [PAGE...]
 
-Each page by the commands that stand on it, all if none is named; the logs that they need are
-recorded first. It takes four to five hours on two cores. Broken off, the same command goes on where
-it stopped (runs/shifting, 4 GB; remove it after policies have changed). Large ones of `identify`'s
-pages to hover over are left out. The pages docs/results/shifting/*.md are written by hand, but for
+Runs the command on each named page, or on all pages, and records the logs that it needs first. All
+pages take four to five hours on two cores. If it is interrupted, the same command resumes
+(runs/shifting, 4 GB; remove it after policies have changed). Interactive pages of `identify` above
+`LARGEST` are left out. The pages docs/results/shifting/*.md are written by hand, except for
 trained-on-shifts.md.
 """
 
@@ -18,8 +18,8 @@ from pathlib import Path
 WORK = Path("runs/shifting")
 RESULTS = Path(__file__).parent.parent / "docs" / "results" / "shifting"
 LARGEST = 200_000
-"""Of a page to hover over [bytes]."""
-ITS_LINK = " [As a page](page.html) to hover over and zoom into."
+"""Largest interactive page that is copied [bytes]."""
+ITS_LINK = " The same as an [interactive page](page.html)."
 
 SLOPES = ("across-10", "down-10", "down-15", "up-10", "up-15")
 SMOOTH = (*SLOPES, "flat", "pebbles-4cm", "steps-5cm")
@@ -27,7 +27,7 @@ AMPLITUDES = ("0.05", "0.07", "0.10", "0.15", "0.20")
 NOISE = tuple(f"into-{a}" for a in AMPLITUDES)
 WAY_BACK = tuple(f"out-of-{a}" for a in AMPLITUDES)
 ROUGHER = ("0.25", "0.30", "0.40")
-"""Amplitudes beyond the standard courses', for the audit of the paper's numbers [m]."""
+"""Amplitudes above those of the standard courses, for the paper's numbers [m]."""
 OSCILLATORS = {
     "down-5": "slope:-5@8",
     "flat": "flat@12",
@@ -38,7 +38,7 @@ OSCILLATORS = {
 
 
 def logs(gait: str, courses: tuple[str, ...], *seeds: int) -> list[str]:
-    """Their files, in the order of their names within a seed."""
+    """Files of these courses, sorted by name within a seed."""
     return [f"logs/{gait}-{course}-{seed}.npz" for seed in seeds for course in sorted(courses)]
 
 
@@ -93,12 +93,12 @@ STUDIED = {
 
 
 def gaitshift(*arguments: str | Path) -> None:
-    """One command of the package, within `WORK`."""
+    """Runs one command of the package in `WORK`."""
     subprocess.run([sys.executable, "-m", "gaitshift", *map(str, arguments)], cwd=WORK, check=True)
 
 
 def record(page: str) -> None:
-    """The logs of a page that are not there yet."""
+    """Records the missing logs of a page."""
     for log in IDENTIFIED[page]:
         if not log.endswith(".npz") or (WORK / log).is_file():
             continue
@@ -114,7 +114,7 @@ def record(page: str) -> None:
 
 
 def walk(log: str, *what: str, robots: int, seed: int) -> None:
-    """A log of a walk on which nobody shifts, since no number reaches an α of 9."""
+    """Records a walk without a shift: no value of a statistic reaches an α of 9."""
     crowd = ("--episodes", str(robots), "--seed", str(seed), "--no-video")
     gaitshift("demo", "--alpha", "9", *what, *crowd, "--out", "walk", "--overwrite")
     (WORK / "logs").mkdir(exist_ok=True)
@@ -122,7 +122,7 @@ def walk(log: str, *what: str, robots: int, seed: int) -> None:
 
 
 def make(page: str) -> None:
-    """A page, and all that lies in its folder."""
+    """Makes the folder of a page."""
     if page in STUDIED:
         gaitshift(*STUDIED[page], "--out", f"docs/results/shifting/{page}")
         made = WORK / "docs" / "results" / "shifting" / page
@@ -141,7 +141,7 @@ def make(page: str) -> None:
 
 
 def main() -> None:
-    """Makes what is named, or all."""
+    """Makes the named pages, or all."""
     pages = [*IDENTIFIED, *STUDIED]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pages", nargs="*", metavar="PAGE", help=f"of {', '.join(pages)}")

@@ -1,12 +1,12 @@
-"""Trains many times and writes the results: pages below docs/results.
+"""Trains policies from several seeds and writes the results as pages of docs/results.
 
 Usage: python tools/training_evidence.py seeds|additions|shifts [--jobs N] [--seeds N]
 
-`seeds` trains trot, pace and bound on flat ground with five fresh seeds each; `additions` trains
-trot without each of the reward's additions in turn, three seeds each; one run takes about six
-minutes on a core. `shifts` trains bound to the end, two seeds with and two without episodes
-that begin in the midst of a stride, a quarter of an hour each. `--seeds` changes how many seeds.
-Broken off, the same command goes on where it stopped (runs/evidence).
+`seeds` trains trot, pace and bound on flat ground with five fresh seeds each. `additions` trains
+trot without each of the reward's additions, three seeds each. Each of these runs takes about six
+minutes on one core. `shifts` trains bound by the whole recipe, two seeds with mixed starts and two
+without, a quarter of an hour each. `--seeds` changes the number of seeds. If it is interrupted, the
+same command resumes (runs/evidence).
 """
 
 import argparse
@@ -42,24 +42,25 @@ JUDGED = EvaluationConfig(episodes=64, seconds=12.0)
 
 SEEDS_HEAD = """# Is the flat stage clean from fresh seeds?
 
-From {seeds} fresh seeds a gait, so many policies are clean: {clean}.
+With {seeds} fresh seeds per gait, these policies are clean: {clean}.
 
-The flat stage of the default recipe alone ({iterations} iterations, {steps:.1f} million control
-steps, about six minutes on one core), for {seeds} seeds from 1 on. Each policy is judged on flat
-ground, 64 robots for 12 s, by the limits of `gaitshift evaluate`, whose speed loop trims the asked
-speed; open loop: the mean speed without it.
+Each policy is trained by the flat stage of the default recipe alone ({iterations} iterations,
+{steps:.1f} million control steps, about six minutes on one core), for seeds 1 to {seeds}.
+It is judged on flat ground, with 64 robots for 12 s, by the limits of `gaitshift evaluate`. The
+speed loop of `evaluate` is on; the column *open loop* gives the mean speed without it.
 This page is made by `python tools/training_evidence.py seeds --seeds {seeds}`.
 """
 ADDITIONS_HEAD = """# What does each addition to Table I contribute?
 
-The trot is never clean without {never}; it is clean from some seeds only without {some}; it is
-always clean without {always}.
+When one addition is left out, the trot is never clean without {never}; clean on some seeds only
+without {some}; and always clean without {always}.
 
-Trot by the first {iterations} iterations of the default recipe, on flat ground, whole and without
-each of the seven terms that the reward adds to the paper's Table I, and without each of the two
-factors of the bonus (`gaitshift.sim.reward.ADDITIONS`, `BONUS_SHARES`). The numbers are means over
-{seeds} seed(s) from 1 on; each policy is judged on flat ground, 64 robots for 12 s. Clean: how many
-keep all limits of `gaitshift evaluate`. Worst touchdowns: of the foot furthest from one a cycle.
+A trot is trained by the first {iterations} iterations of the default recipe, on flat ground: once
+with all additions, and once without each of the seven terms that the reward adds to the paper's
+Table I and each of the two factors of the bonus (`gaitshift.sim.reward.ADDITIONS`,
+`BONUS_SHARES`). The numbers are means over seeds 1 to {seeds}. Each policy is judged on flat
+ground, with 64 robots for 12 s. *Clean* counts the policies that keep all limits of `gaitshift
+evaluate`. *Worst touchdowns* are those of the foot that is furthest from one touchdown per cycle.
 This page is made by `python tools/training_evidence.py additions --seeds {seeds}`.
 """
 SHIFTED = "bound"
@@ -72,13 +73,13 @@ SHIFTS_HEAD = """# Does training for shifts help?
 On noise of 0.10 m {mixed} shifts into a bound fail after training with mixed starts, and {plain}
 without.
 
-The paper exchanges gaits in an instant and trains nothing for it. Here a bound is trained by the
-default recipe, and by one that differs in one number: on the rough stage the share {share:g} of the
-episodes begins within a stride that belongs to no gait, each leg as another robot has it
-(`Stage.mixed_starts`). Then {switches} robots shift into it at all phases of a trot, and as many
-from a pace, on noise of 0.10 m, as in `gaitshift transitions`. Touchdowns (of the foot furthest
-from one a cycle) and cost of transport are those on flat ground, 64 robots for 12 s; survival is
-that of 64 robots for 20 s on rough ground.
+The paper exchanges gaits in an instant and does not train for it. Here a bound is trained by the
+default recipe, and by the same recipe with mixed starts: on the rough stage the share {share:g}
+of the episodes begins with the legs of different robots (`Stage.mixed_starts`), as after a shift.
+Then {switches} robots shift into this bound at random phases of a trot, and as many from a pace,
+on noise of 0.10 m, as in `gaitshift transitions`. Touchdowns (of the foot that is furthest from
+one per cycle) and cost of transport are those of 64 robots for 12 s on flat ground. The last
+three columns are the survival of 64 robots for 20 s on rough ground.
 This page is made by `python tools/training_evidence.py shifts --seeds {seeds}`.
 """
 
@@ -92,14 +93,14 @@ class Default(Setting):
         return gaits.load(gait)
 
 
-def setting(iterations: int, without: str | None = None, name: str = "ours") -> Default:
+def setting(iterations: int, without: str | None = None, name: str = "default") -> Default:
     """The first iterations of the recipe on one core, without one of the additions."""
     recipe = Recipe(threads=1, physics_threads=1).with_iterations(iterations)
     if without is not None:
         reward = replace(recipe.env.reward, **{without: 0.0})
         recipe = replace(recipe, env=replace(recipe.env, reward=reward))
         name = f"no-{without}"
-    return Default(name=name, group="ours", label=without or "whole", recipe=recipe)
+    return Default(name=name, group="default", label=without or "whole", recipe=recipe)
 
 
 def jobs_of(settings: Iterable[Default], names: Iterable[str], seeds: Iterable[int]) -> list[Job]:
@@ -205,7 +206,7 @@ def write_shifts(processes: int, seeds: int) -> Path:
     starts = (replace(stage, mixed_starts=MIXED_STARTS) for stage in rough)
     mixed = replace(plain, stages=(flat, *starts))
     settings = (
-        Default(name="plain", group="shifts", label="as it is", recipe=plain),
+        Default(name="plain", group="shifts", label="default", recipe=plain),
         Default(name="mixed", group="shifts", label="mixed starts", recipe=mixed),
     )
     jobs = jobs_of(settings, (SHIFTED,), range(seeds))

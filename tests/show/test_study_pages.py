@@ -81,7 +81,7 @@ def test_a_map_says_of_the_chosen_cell_what_judging_said_of_the_chosen_numbers(i
         assert float(figure["y"]["values"][j].split()[0]) == pytest.approx(
             float(row["alpha"]), rel=5e-3
         )
-        assert told(figure, "noticed")[j, i] == int(row["detected"])
+        assert told(figure, "detected")[j, i] == int(row["detected"])
         assert told(figure, "after")[j, i] == pytest.approx(float(row["delay_m"]))
         assert told(figure, "false shifts")[j, i] == int(row["false_shifts"])
         assert told(figure, "in")[j, i] == pytest.approx(float(row["km"]))
@@ -92,11 +92,11 @@ def test_a_map_says_of_the_chosen_cell_what_judging_said_of_the_chosen_numbers(i
 def test_cells_without_a_shade_are_those_with_false_shifts_and_with_misses(identified):
     figure = figures(identified / "page.html")["map0"]
     kind = np.reshape(unpacked(figure["kind"]), (figure["y"]["count"], figure["x"]["count"]))
-    wrong, noticed = told(figure, "false shifts"), told(figure, "noticed")
+    wrong, detected = told(figure, "false shifts"), told(figure, "detected")
     assert set(np.unique(kind)) == {0, 1, 2}
     assert ((wrong > 0) == (kind == 1)).all()
-    assert (2 * noticed[kind == 0] > 3).all(), "most of the three robots"
-    assert (2 * noticed[kind == 2] <= 3).all()
+    assert (2 * detected[kind == 0] > 3).all(), "most of the three robots"
+    assert (2 * detected[kind == 2] <= 3).all()
     shade = np.reshape(unpacked(figure["values"]), kind.shape)
     assert np.isfinite(shade[kind == 0]).all()
 

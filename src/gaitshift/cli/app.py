@@ -76,7 +76,7 @@ def _nobody_reads() -> bool:
 
 
 def _parse(arguments: list[str] | None) -> Command:
-    """The command that the arguments ask for; `GaitshiftError` where they cannot be read."""
+    """The command in the arguments; `GaitshiftError` where they cannot be read."""
     said = io.StringIO()
     try:
         with redirect_stderr(said):

@@ -59,8 +59,8 @@ class Evaluate(RobotOption, EvaluationConfig):
     policy: Annotated[str, tyro.conf.Positional]
     """A shipped policy by the name of its gait, or a policy file ending in .onnx."""
     controller: str = "policy"
-    """What walks, by name: `policy`; or, in the gait of this name, `cpg`, coupled oscillators that
-    learned nothing: a baseline (trot, pace, bound, walk)."""
+    """What walks, by name: `policy`; or, in the gait of this name, `cpg`, coupled oscillators
+    without learning, a baseline (trot, pace, bound, walk)."""
     trials: Literal["all", "short", "quick"] | None = None
     """Run the standard trials and compare each figure with its limit: all (1000 pushed episodes,
     then 256 of 20 s on each terrain), short (a quarter of each), or quick (for a first check)."""

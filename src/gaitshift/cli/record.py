@@ -34,7 +34,7 @@ class Record(RobotOption):
     """Shipped policies by the names of their gaits, or policy files ending in .onnx; with another
     controller, names of its gaits."""
     controller: str = "policy"
-    """What walks, by name: `policy`; `cpg`, coupled oscillators that learned nothing."""
+    """What walks, by name: `policy`; `cpg`, coupled oscillators without learning."""
     out: Path
     """Folder of the logs."""
     courses: tuple[str, ...] = ()

@@ -33,7 +33,7 @@ class Train(RobotOption):
     gait: Annotated[str | None, tyro.conf.Positional] = None
     """Name of a gait (see `gaitshift gaits`) or a machine file (.toml)."""
     preset: Literal["default", "two-stage", "paper"] = "default"
-    """Training recipe: ours; two-stage, ours before it had a third stage; or the paper's (Table I,
+    """Training recipe: default; two-stage, without the last stage; or paper (Table I,
     30 robots, Kp 3, Kd 0.2, flat ground)."""
     robots: int | None = None
     """Number of robots in parallel; by default that of the recipe."""

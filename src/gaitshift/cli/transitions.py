@@ -113,7 +113,7 @@ class Transitions(RobotOptions):
             emit_table(f"shifts, {self.switches} each; results in {self.out}", _table(rows))
 
     def _draw(self, rows: list[dict[str, Any]]) -> None:
-        """A map a ground, of all that the table has."""
+        """Draws one map per ground, of all rows of the table."""
         from gaitshift.lab.studies.transitions import picture_of
         from gaitshift.show.plots.studies import transition_map  # matplotlib is slow to import
 

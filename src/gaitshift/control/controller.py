@@ -1,4 +1,4 @@
-"""What drives robots, learned or not, the gaits that it knows, and controllers by their names."""
+"""The interface of controllers, learned or not, their gaits, and controllers by name."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -72,7 +72,7 @@ class Controller(Protocol):
     n: int
     """Robots."""
     repertoire: Repertoire
-    """The gaits that it knows."""
+    """The available gaits."""
     gait: Int[np.ndarray, " N"]
     """Index into the repertoire of the gait that each robot is in."""
 

@@ -50,8 +50,8 @@ GAITS = {
         CpgGait(name="walk", frequency=1.2, duty=0.75, speed=0.3, clearance=0.09),
     )
 }
-"""By name; numbers found by trying on flat ground. The feet of one side, or of one end, tip the
-body like a pendulum: only fast short steps near its middle keep it level."""
+"""By name; ours: the numbers were tuned on flat ground. Feet of one side or one end tip the body
+like a pendulum, so that only fast, short steps near its middle keep it level."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Drives N robots by trained policies, each in the gait of the moment."""
+"""Drives N robots by trained policies, each in its present gait."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -53,7 +53,7 @@ class Driver:
             last_action=np.zeros((n, 12)),
             touch_height=np.full((n, 4), np.nan),  # until feet are seen
         )
-        """Where each robot is in its gait."""
+        """State of each robot in its gait."""
         # Changes of state until a machine that a shift began has gone round once.
         self._changes_due: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._acted_on: list[tuple[Policy, Int[np.ndarray, " K"], np.ndarray]] = []

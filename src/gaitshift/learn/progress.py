@@ -1,4 +1,4 @@
-"""The tables of a run that grow by a row an iteration: reads them, cuts them, finds a row."""
+"""The tables of a run, one row per iteration: reads them, cuts them, finds a row."""
 
 from pathlib import Path
 from typing import Any

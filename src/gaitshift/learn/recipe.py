@@ -42,8 +42,8 @@ class PpoConfig:
     """Every batch is doubled by its mirror image (left and right changed), where the machine is
     symmetric; ours, after Mittal et al. 2024."""
     fused_adam: bool = False
-    """Whether Adam's arithmetic is one kernel: a sixth less time where mini-batches are small and
-    many, and other last digits."""
+    """Whether Adam runs as one kernel: a sixth less time with many small mini-batches, and
+    different rounding."""
 
 
 FIELD_KINDS = ("flat", "perlin", "slope", "stair", "step")

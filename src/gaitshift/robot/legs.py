@@ -39,10 +39,10 @@ def contact_of(label: Int[np.ndarray, "*batch"]) -> Bool[np.ndarray, "*batch 4"]
 
 
 HIP_X, HIP_Y = 0.277, 0.116
-"""Where the abduction axis lies, from the base origin [m]."""
+"""Position of the abduction axis from the base origin [m]."""
 
 THIGH_X, LEG_Y = 0.0635, 0.13
-"""From there: the flexion axis, and how far outside the leg's plane lies [m]."""
+"""Offset from there to the flexion axis, and lateral offset of the leg's plane [m]."""
 
 THIGH = 0.25
 """From the flexion axis to the knee [m]."""
@@ -52,7 +52,7 @@ SHANK_X, SHANK_Z = 0.1, 0.298
 
 SHANK = float(np.hypot(SHANK_X, SHANK_Z))
 BEND = float(np.arctan2(SHANK_X, SHANK_Z))
-"""Length of that way [m], and its angle from the shank's own axis [rad]."""
+"""Length of this offset [m], and its angle from the shank's axis [rad]."""
 
 FORE = np.array([1.0, 1.0, -1.0, -1.0])
 SIDE = np.array([1.0, -1.0, 1.0, -1.0])
@@ -62,8 +62,8 @@ SIDE = np.array([1.0, -1.0, 1.0, -1.0])
 def joint_angles(foot: Float[np.ndarray, "N 4 3"]) -> Float[np.ndarray, "N 12"]:
     """Joint angles [rad] that bring the middle of each foot to a point in the body frame [m].
 
-    Knees point towards each other, as in the stance. Points out of reach are drawn in to the
-    nearest that is in reach.
+    Knees point towards each other, as in the stance. Points out of reach are replaced by the
+    nearest point in reach.
     """
     x = foot[..., 0] - FORE * (HIP_X + THIGH_X)
     y = foot[..., 1] - SIDE * HIP_Y

@@ -1,1 +1,1 @@
-"""What people look at: plots, films, a live page, reports."""
+"""Visualisation: plots, films, a live page, reports."""

@@ -42,9 +42,9 @@ def middle(outcomes: Sequence[Outcome]) -> Outcome:
 
 
 def ratio(ours: Outcome, baseline: Outcome) -> float | None:
-    """The baseline's wall time over ours; a lower bound where the baseline was stopped.
+    """The baseline's wall time over gaitshift's; a lower bound where the baseline was stopped.
 
-    None where ours was stopped.
+    None where gaitshift's training was stopped.
     """
     return baseline.seconds / ours.seconds if ours.reached else None
 
@@ -56,7 +56,7 @@ def ratio_text(times: float, *, is_lower_bound: bool) -> str:
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """By gait: each learner's median and seeds, and the ratio where ours reached the gait."""
+    """By gait: each learner's median and seeds, and the ratio where gaitshift reached the gait."""
     return {
         gait: _of_gait([outcome for outcome in outcomes if outcome.gait == gait])
         for gait in dict.fromkeys(outcome.gait for outcome in outcomes)

@@ -1,4 +1,4 @@
-"""Time to gait: how long training takes until a policy meets a criterion, beside a baseline's."""
+"""Time to gait: how long training takes until a policy meets a criterion, and a baseline's."""
 
 import hashlib
 import json

@@ -59,8 +59,8 @@ class DemoConfig:
     hold: float | None = None
     """Least time in either gait [s]."""
     controller: str = "policy"
-    """What walks, by name: `policy`, trained policies; `cpg`, coupled oscillators that learned
-    nothing (trot, pace, bound, walk), which go slowly and on low noise alone."""
+    """What walks, by name: `policy`, trained policies; `cpg`, coupled oscillators without learning
+    (trot, pace, bound, walk), for slow walks on low noise."""
     gaits: tuple[str, ...] = ()
     """Gaits to show in sequence on a schedule, in place of the condition."""
     every: float = 3.0

@@ -115,7 +115,7 @@ class RoughnessClassifier:
             name=NAME,
             low=0.02,
             high=0.999,
-            note="gradient boosting on all signals: the upper bound",
+            note="gradient boosting on all statistics: the upper bound",
             values=lambda recording: self.probability(recording, crosswise=crosswise),
         )
 

@@ -76,7 +76,7 @@ def _code() -> str:
 
 
 ALL = "all"
-"""Stands for every condition that the logs feed."""
+"""Stands for every condition whose signals are in the logs."""
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from gaitshift.sim.reward import RewardConfig
 
 LOCKOUT = 10
 """Control steps between two changes of state in the main runs. The paper prints none; the first
-author's code for another robot has 10, and the published plateau of 25 to 27 asks for it: with
-b = 200 added at most every 20 steps no reward above 10 + 200 / 20 = 20 a step can be had."""
+author's code for another robot has 10, and the published plateau of 25 to 27 implies it: with
+b = 200 added at most every 20 steps no reward above 10 + 200 / 20 = 20 per step is possible."""
 
 PAPER = "paper"
 """Name of the setting with which the others are compared."""
@@ -19,21 +19,21 @@ PAPER = "paper"
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """One way to train: a recipe, and a lock-out for the machine of whichever gait."""
+    """One way to train: a recipe, and a lock-out for the machine of any gait."""
 
     name: str
     """In the names of runs and in tables."""
     group: str
     """The question that it answers, together with the paper's setting."""
     label: str
-    """What is special, in few words."""
+    """Short description of the change."""
     recipe: Recipe
     """Everything but the machine."""
     lockout: int = LOCKOUT
     """Least time between two changes of the machine's state [control steps]."""
 
     def machine(self, gait: str) -> RewardMachine:
-        """The gait's machine with this lock-out, and feet lifted as low as they like."""
+        """The gait's machine with this lock-out, and without a swing height."""
         own = gaits.load(gait)
         edges = tuple(
             replace(edge, guard=replace(edge.guard, dwell=self.lockout), swing_height=0.0)
@@ -87,7 +87,7 @@ ABLATIONS = (
     ),
     Setting(name="paper-gains", group="gains", label="Kp 3, Kd 0.2", recipe=_recipe(gains="paper")),
 )
-"""Each differs from `REFERENCE` in the one thing that it names."""
+"""Each differs from `REFERENCE` in the one setting that it names."""
 
 AS_IN_THE_PAPER = {
     "bonus": "R + b",
@@ -97,7 +97,7 @@ AS_IN_THE_PAPER = {
     "penalties": "λ = 1 from the start",
     "gains": "Kp 80, Kd 2",
 }
-"""What the reference has where a group differs."""
+"""Label of the reference in each group."""
 
 
 GAITS = ("trot", "bound", "pace")

@@ -1,4 +1,4 @@
-"""Jobs trained to their end, on as many processes as wanted, whatever became of them before."""
+"""Trains jobs to their end in several processes, and resumes those that were interrupted."""
 
 import json
 import multiprocessing
@@ -96,7 +96,7 @@ def _check_same(job: Job, folder: Path) -> None:
 
 
 LOOK_EVERY = 1.0
-"""Seconds between two looks at how far the runs are."""
+"""Seconds between two updates of the progress."""
 
 
 def train_all(
@@ -105,10 +105,10 @@ def train_all(
     processes: int,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Trains what is not over yet, each job in the folder of its name below `runs`.
+    """Trains all unfinished jobs, each in the folder of its name below `runs`.
 
-    `report` is called with the iterations done and those that were left at the start. Whatever
-    ends this ends the processes too; the same call goes on from the last checkpoints.
+    `report` is called with the iterations done and those that were left at the start. When this
+    function ends, its processes end; the same call resumes from the last checkpoints.
 
     Raises:
         GaitshiftError: a folder holds another run, or a process was killed.
@@ -141,7 +141,7 @@ def train_all(
 
 
 def _new_iterations(job: Job, runs: Path, before: dict[str, int]) -> int:
-    """Iterations since the start of this command; all that were left where a run broke down."""
+    """Iterations since the start of this command; a diverged run counts as complete."""
     folder = runs / job.name
     if (folder / FAILED).is_file():
         return job.recipe.iterations - before[job.name]
@@ -163,7 +163,7 @@ def _interrupts_ignored() -> Generator[None]:
 
 
 def _end_with_parent() -> None:
-    """Lets no process outlive the command, not even one that was killed."""
+    """Ends this process when the command ends, even if the command is killed."""
     parent = multiprocessing.parent_process()
     assert parent is not None
 

@@ -20,10 +20,10 @@ from gaitshift.sim.world import World
 from gaitshift.table import Row, markdown
 
 BEFORE, NOISE, AFTER = 4.0, 15.0, 5.0
-"""Metres of level ground, of noise, and of level ground again, from the start to the finish."""
+"""Lengths of level ground, noise, and level ground again, from start to finish [m]."""
 
 PATIENCE = 2.0
-"""Time limit of the robots over the time that they need at the commanded speed."""
+"""Time limit, as a multiple of the time at the commanded speed."""
 
 BATCH = 256
 """Robots at a time, over eight fields of noise."""
@@ -73,7 +73,7 @@ class Crossings:
     cost_of_transport: Float[np.ndarray, " N"]
     """Energy Σ|τ q̇| dt over weight and distance; NaN for robots that walked less than a metre."""
     shifts: Int[np.ndarray, " N"]
-    """Changes of gait until then."""
+    """Changes of gait until the finish, the fall or the end."""
 
 
 def cross(
@@ -176,11 +176,11 @@ interval of a mean (95 % both)."""
 PICTURE = "crossings.png"
 
 ENOUGH = 2
-"""Shifts that one stretch of noise is worth; more are chatter."""
+"""Largest number of shifts per stretch of noise without chatter."""
 
 
 def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> Row:
-    """What came of the crossings of one way."""
+    """The results of the crossings of one way, as a row."""
     n, fell = len(crossings.fell), int(crossings.fell.sum())
     low, high = wilson(np.array([float(n - fell)]), np.array([float(n)]))
     cost = crossings.cost_of_transport
@@ -228,7 +228,8 @@ def page(rows: Sequence[Row], command: str) -> str:
         "chattered",
     )
     parts = [
-        "# Does the shift help on rough ground?",
+        "# Do more robots survive on rough ground when they shift?",
+        _answer(rows),
         f"Robots cross {BEFORE:g} m of level ground, {NOISE:g} m of Perlin noise of one amplitude "
         f"and {AFTER:g} m of level ground: in one gait, in the other, with shifts by a condition, "
         "or with shifts by an oracle that knows where the noise is. Fields and starts are the same "
@@ -247,6 +248,14 @@ def page(rows: Sequence[Row], command: str) -> str:
             markdown(head, [_cells(row) for row in of]),
         ]
     return "\n\n".join(parts) + "\n"
+
+
+def _answer(rows: Sequence[Row]) -> str:
+    """How many robots survive on the roughest ground, in one sentence."""
+    largest = max(row["amplitude"] for row in rows)
+    of = [row for row in rows if row["amplitude"] == largest]
+    counts = ", ".join(f"{row['way']} {row['survived']} of {row['runs']}" for row in of)
+    return f"On noise of {largest:g} m these robots survive: {counts}."
 
 
 def _cells(row: Row) -> tuple[str, ...]:

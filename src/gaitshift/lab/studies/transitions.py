@@ -55,7 +55,7 @@ class Outcomes:
     fell: Bool[np.ndarray, " N"]
     """Whether the robot fell within `WATCHED` seconds."""
     settle: Float[np.ndarray, " N"]
-    """Time until the new gait is reached for good [s]; NaN where it never is."""
+    """Time until the new gait is reached and held [s]; NaN where it never is."""
     dip: Float[np.ndarray, " N"]
     """Largest drop of a stride's mean speed below the slower of the two commands [m/s]."""
     tilt: Float[np.ndarray, " N"]
@@ -173,7 +173,7 @@ def _phase(
 
 
 PHASES = 10
-"""Parts that the stride is cut into."""
+"""Number of equal parts of the stride."""
 
 COLUMNS: dict[str, type] = {
     "old": str,
@@ -192,15 +192,15 @@ COLUMNS: dict[str, type] = {
     "worst_phase": str,
     "worst_phase_success": float,
 }
-"""Of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
+"""Columns of the CSV file; `low` and `high` are the interval of the success rate (95 %)."""
 
-_INTRODUCTION = """# Gait shifts at a random phase
+TITLE = "Does a gait shift at a random phase succeed?"
 
-Policy and reward machine are swapped at a random phase of the old gait's stride. A shift succeeds
-if the robot does not fall within 5 s and, from some stride on, the contacts match the new gait in
-at least half of the steps of every stride. Settle time ends with the first such stride. Dip is the
-largest drop of the mean speed of a stride below the slower of the two commands. Intervals are 95 %
-Wilson intervals."""
+_INTRODUCTION = """Policy and reward machine are swapped at a random phase of the old gait's
+stride. A shift succeeds if the robot does not fall within 5 s and, from some stride on, the
+contacts match the new gait in at least half of the steps of every stride. Settle time ends with
+the first such stride. Dip is the largest drop of the mean speed of a stride below the slower of
+the two commands. Intervals are 95 % Wilson intervals."""
 
 HEAD = (
     "from",
@@ -213,11 +213,11 @@ HEAD = (
     "tilt, 95 % within [°]",
     "worst phase",
 )
-"""Above the cells of `row_cells`."""
+"""Head of the table of `row_cells`."""
 
 
 def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
-    """What came of the shifts of a pair."""
+    """The results of the shifts of a pair, as a row."""
     n, good = len(outcomes.success), int(outcomes.success.sum())
     low, high = wilson(np.array([float(good)]), np.array([float(n)]))
     settled = outcomes.settle[outcomes.success]
@@ -248,17 +248,32 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
 
 def page(rows: Sequence[Row], command: str) -> str:
     """The whole page; `command` made the last of the rows."""
-    parts = [_INTRODUCTION, f"Made by `{command}`. The same as an [interactive page](page.html)."]
+    parts = [f"# {TITLE}", answer(rows), _INTRODUCTION]
+    parts.append(f"Made by `{command}`. The same as an [interactive page](page.html).")
     for ground in dict.fromkeys(row["ground"] for row in rows):
         of = [row for row in rows if row["ground"] == ground]
-        total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
         parts += [
             f"## {ground}",
-            f"{good} of {total} shifts succeeded.",
+            f"{succeeded(of)} shifts succeeded.",
             f"![Failed shifts on {ground}]({picture_of(ground)})",
             markdown(HEAD, [row_cells(row) for row in of]),
         ]
     return "\n\n".join(parts) + "\n"
+
+
+def answer(rows: Sequence[Row]) -> str:
+    """How many shifts succeeded on each ground, in one sentence."""
+    grounds = dict.fromkeys(row["ground"] for row in rows)
+    counts = ((ground, [row for row in rows if row["ground"] == ground]) for ground in grounds)
+    parts = [f"on `{ground}` {succeeded(of)} shifts succeed" for ground, of in counts]
+    text = ", and ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def succeeded(rows: Sequence[Row]) -> str:
+    """Number of shifts that succeeded, of all, as text."""
+    good, total = (sum(row[name] for row in rows) for name in ("successes", "switches"))
+    return f"{good} of {total}"
 
 
 def picture_of(ground: str) -> str:

@@ -18,9 +18,7 @@ class Oracle:
     unit = ""
     width = 1
     needs = ()
-    search = SearchRange(
-        low=0.4, high=0.6, leaks=(0.0,), note="sees the ground: a point of reference"
-    )
+    search = SearchRange(low=0.4, high=0.6, leaks=(0.0,), note="knows the true ground: a reference")
 
     def start(self, n: int) -> None:
         """No memory."""

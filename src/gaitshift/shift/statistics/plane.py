@@ -34,7 +34,7 @@ class PlaneResidual:
     unit = "m"
     width = 1
     needs = ()
-    search = SearchRange(low=0.002, high=0.2, note="two touches a foot about their plane")
+    search = SearchRange(low=0.002, high=0.2, note="distance of the last touches from their plane")
 
     def __post_init__(self) -> None:
         _ = self._memory

@@ -23,7 +23,7 @@ class AttitudeVariance:
     unit = "rad"
     width = 1
     needs = ()
-    search = SearchRange(low=0.003, high=0.3, note="deviation of roll and pitch")
+    search = SearchRange(low=0.003, high=0.3, note="spread of roll and pitch over time")
 
     def __post_init__(self) -> None:
         check_positive(self, "window")
@@ -63,7 +63,7 @@ class CostOfTransport:
     unit = ""
     width = 1
     needs = ("joint_torque", "joint_velocity", "velocity_b")
-    search = SearchRange(low=0.1, high=10.0, note="power over weight and speed")
+    search = SearchRange(low=0.1, high=10.0, note="mechanical power over weight and speed")
 
     def __post_init__(self) -> None:
         check_positive(self, "window", "mass", "least_speed")
@@ -112,9 +112,7 @@ class Slip:
     unit = "m/s"
     width = 4
     needs = ("velocity_b", "angular_velocity_b")
-    search = SearchRange(
-        low=0.02, high=2.0, leaks=SIX_LEAKS, note="speed of feet that ought to stand"
-    )
+    search = SearchRange(low=0.02, high=2.0, leaks=SIX_LEAKS, note="speed of the feet in contact")
 
     def __post_init__(self) -> None:
         check_positive(self, "window")
@@ -220,7 +218,7 @@ class ValueDrop:
     unit = ""
     width = 1
     needs = ("value",)
-    search = SearchRange(low=0.01, high=100.0, note="the critic expects less than it did")
+    search = SearchRange(low=0.01, high=100.0, note="drop of the return that the critic expects")
 
     def __post_init__(self) -> None:
         check_positive(self, "fast", "slow")

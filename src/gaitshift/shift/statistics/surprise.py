@@ -99,7 +99,7 @@ class TouchdownSurprise:
         low=0.005 / 20 ** (50 / 99),  # 1.1 mm, in the steps of 100 values from 5 mm to 10 cm
         high=0.1,
         count=150,
-        note="how new touches change about the plane of the earlier ones",
+        note="changes of touchdown errors from the plane of earlier touches",
     )
 
     def __post_init__(self) -> None:

@@ -1,4 +1,4 @@
-"""What is to be seen in three dimensions: the robot's bodies, the ground, the last touches."""
+"""Geometry in three dimensions: the robot's bodies, the ground, the last touches."""
 
 from gaitshift.show.geometry.frame import Frame as Frame
 from gaitshift.show.geometry.frame import frames_of as frames_of

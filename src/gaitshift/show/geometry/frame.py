@@ -1,4 +1,4 @@
-"""What is to be seen of N robots at one instant: a step of a log, and where feet touched last."""
+"""One frame of N robots: a step of a log, and the last touch of each foot."""
 
 from dataclasses import dataclass
 from typing import Any, cast
@@ -17,15 +17,15 @@ class Frame:
     """N robots at one instant."""
 
     step: Log
-    """All that is known of it."""
+    """The step of the log."""
     touch_w: Float[np.ndarray, "N 4 3"]
-    """Where each foot touched last, world frame [m]; NaN before."""
+    """Position of the last touch of each foot, world frame [m]; NaN before the first."""
     touch_height: Float[np.ndarray, "N 4"]
-    """Height above the base of each foot then, along the vertical [m]; NaN before."""
+    """Its height above the base at that time, along the vertical [m]; NaN before the first."""
 
     @classmethod
     def after(cls, before: "Frame | None", step: Log) -> "Frame":
-        """The frame of a step, `before` being the one before it."""
+        """The frame of a step; `before` is the frame before it."""
         contact, feet, height = (
             step.sensed.contact,
             step.truth.foot_position_w,
@@ -49,7 +49,7 @@ class Frame:
 
 
 def frames_of(log: Log, every: int) -> list[Frame]:
-    """The entries of a log, one of `every`, in double precision."""
+    """Every `every`-th entry of a log, in double precision."""
     frames, frame = list[Frame](), None
     for t in range(len(log.time)):
         frame = Frame.after(frame, log[t].as_type(np.float64))

@@ -17,19 +17,19 @@ from jaxtyping import Float, Int
 from gaitshift.robot.description import Robot
 
 _LEGS = {"LF": "FL", "RF": "FR", "LH": "BL", "RH": "BR"}
-"""Its names of the legs, and ours."""
+"""Names of the legs in the URDF, and here."""
 
 _CARBON = "0.2 0.2 0.21 1"
-"""Stands for the pictures of carbon fibre."""
+"""Colour in place of the textures of carbon fibre."""
 
 _PLAIN = (0.45, 0.45, 0.46)
-"""Of parts without a material."""
+"""Colour of parts without a material."""
 
 _KEPT = 0.09
-"""Share of the triangles that is kept of each part."""
+"""Share of the triangles of each part that remains after simplification."""
 
 _FEWEST = 150
-"""Parts with fewer triangles stay as they are."""
+"""Parts with fewer triangles are not simplified."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +47,7 @@ class Part:
 
 
 def convert(urdf: Path) -> list[Part]:
-    """The surfaces of all links that have one, in the frames of our model's bodies."""
+    """The surfaces of all links that have one, in the frames of the model's bodies."""
     parts = list[Part]()
     for link in ElementTree.parse(urdf).getroot().iter("link"):
         mesh, origin = link.find("visual/geometry/mesh"), link.find("visual/origin")
@@ -74,7 +74,7 @@ def convert(urdf: Path) -> list[Part]:
 
 
 def _surfaces(file: Path) -> dict[tuple[float, ...], trimesh.Trimesh]:
-    """A COLLADA file as one light mesh a colour."""
+    """A COLLADA file as one simplified mesh per colour."""
     from collada import Collada
 
     found: dict[tuple[float, ...], list[trimesh.Trimesh]] = {}
@@ -97,7 +97,7 @@ def _light(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _without_pictures(file: Path) -> bytes:
-    """The file with plain colours for its pictures, one of which names a file that is not there."""
+    """The file with plain colours in place of its textures, one of which is missing."""
     root = ElementTree.parse(file).getroot()
     space = root.tag.partition("}")[0] + "}"
     for profile in root.iter(f"{space}profile_COMMON"):
@@ -111,22 +111,22 @@ def _without_pictures(file: Path) -> bytes:
 
 
 VISUAL = 2
-"""The models' group of shapes to look at."""
+"""Group of the visual shapes in the models."""
 
 _WHEEL = "example-robot-data"
 _NEEDED = ("collada", "fast_simplification")
 _ROBOTS = "cmeel.prefix/share/example-robot-data/robots"
 _URDF = {"anymal_b": "anymal_b_simple_description/robots/anymal.urdf"}
-"""Descriptions of the robots that the wheel knows."""
+"""Robots whose surfaces are in the wheel, by name."""
 
 
 def has_meshes(robot: Robot) -> bool:
-    """Whether the robot's own surfaces can be had."""
+    """Whether the robot's own surfaces are available."""
     return _description(robot) is not None
 
 
 def put_on(spec: mujoco.MjSpec, robot: Robot) -> None:
-    """Replaces the shapes to look at in a robot's model by its own surfaces, if they can be had."""
+    """Replaces the visual shapes of a robot's model by its own surfaces, if available."""
     parts = _parts(robot)
     replaced = {part.body for part in parts}
     for geom in cast("list[mujoco.MjsGeom]", spec.geoms):
@@ -152,7 +152,7 @@ def put_on(spec: mujoco.MjSpec, robot: Robot) -> None:
 
 
 def _parts(robot: Robot) -> list[Part]:
-    """All surfaces of a robot, from the cache if they are there; none without the extra."""
+    """All surfaces of a robot, from the cache if present; none without the extra `meshes`."""
     urdf = _description(robot)
     if urdf is None:
         return []

@@ -15,7 +15,7 @@ from gaitshift.sim.terrain import Terrain
 _GEOM = mujoco.mjtGeom
 
 _GAMMA = 2.2
-"""Of sRGB, near enough."""
+"""Exponent that approximates sRGB."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,7 +59,7 @@ class Shape:
 
 
 def _mesh_of(model: mujoco.MjModel, body: int) -> trimesh.Trimesh | None:
-    """All that is to be looked at of a body, as one mesh: groups up to `VISUAL`, as in MuJoCo."""
+    """The visual shapes of a body as one mesh: groups up to `VISUAL`, as in MuJoCo."""
     first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
     parts = [
         _geom(model, geom)
@@ -130,19 +130,19 @@ def _primitive(kind: int, size: Float[np.ndarray, " 3"]) -> trimesh.Trimesh:
 
 
 _FINE = 0.08
-"""The ground is drawn with samples this far apart at the finest [m]."""
+"""Least distance between the samples of the drawn ground [m]."""
 
 _LOW, _MIDDLE, _HIGH = (np.array(c) for c in ((150, 136, 120), (205, 194, 178), (242, 236, 226)))
-"""Colours of the ground at its lowest, at level 0 and at its highest."""
+"""Colours of the lowest ground, of height 0 and of the highest."""
 
 _CHECK = 1.0
-"""Edge of the squares on the ground, which show how fast a robot goes [m]."""
+"""Edge of the squares on the ground, which show the speed of a robot [m]."""
 
 
 def ground_grid(
     ground: Terrain,
 ) -> tuple[Float[np.ndarray, " C"], Float[np.ndarray, " R"], Float[np.ndarray, "R C"]]:
-    """Samples of a ground, as fine as is worth drawing: x, y, and the heights there [m]."""
+    """Samples of a ground at the drawn resolution: x, y, and the heights there [m]."""
     (dx, dy), (x0, y0) = ground.cell, ground.origin
     length, width = ground.size
     fine = 0.25 if ground.is_flat else _FINE

@@ -1,4 +1,4 @@
-"""Figures of logs and trainings, as files to look at."""
+"""Figures of logs and trainings as files."""
 
 from gaitshift.show.plots.demo import demo_figure as demo_figure
 from gaitshift.show.plots.hildebrand import hildebrand_diagram as hildebrand_diagram

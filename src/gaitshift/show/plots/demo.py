@@ -1,4 +1,4 @@
-"""The figure of a run: what the feet did, what the condition saw, and when the gait shifted."""
+"""The figure of a run: contacts, signals of the condition, and shifts of gait."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
@@ -29,9 +29,9 @@ class _Row:
     height: float
     """[inch]"""
     tinted: bool = True
-    """Whether the gaits' colours lie behind it."""
+    """Whether its background has the colours of the gaits."""
     of_condition: bool = False
-    """Whether it shows a shift condition, and is left out where there was none."""
+    """Whether it shows a shift condition; such rows are left out without one."""
 
 
 _ROWS = (
@@ -42,7 +42,7 @@ _ROWS = (
     _Row(rows.draw_speed, 1.10),
     _Row(rows.draw_ground, 1.20),
 )
-"""From the top down."""
+"""Rows from top to bottom."""
 
 _WIDTH, _LEFT, _RIGHT = 10.0, 0.72, 0.22
 _HEAD, _FOOT, _GAP = 1.15, 0.62, 0.42
@@ -53,8 +53,8 @@ def demo_figure(log: Log, path: Path, robot: int = 0) -> Figure:
     """Draws one robot's run into a PNG (1600 pixels wide), SVG or PDF file.
 
     Rows over one time axis [s]: gait, contacts, foot heights h_i, counter k below its threshold,
-    forward speed, base and ground; those of the condition are left out where none was at work.
-    Lines through all rows mark the shifts, and a veil covers what comes after a fall.
+    forward speed, base and ground; those of the condition are left out without one.
+    Lines through all rows mark the shifts, and the time after a fall is grey.
 
     Raises:
         GaitshiftError: no such robot, a log of less than two steps, another file ending, or no
@@ -83,7 +83,7 @@ def _page_height(shown: Sequence[_Row]) -> float:
 
 
 def _lay_out(figure: Figure, shown: Sequence[_Row]) -> list[Axes]:
-    """One pair of axes a row."""
+    """One pair of axes per row."""
     page, axes = _page_height(shown), list[Axes]()
     top, width = page - _HEAD, _WIDTH - _LEFT - _RIGHT
     for row in shown:
@@ -94,7 +94,7 @@ def _lay_out(figure: Figure, shown: Sequence[_Row]) -> list[Axes]:
 
 
 def _share_time(page: Sequence[Axes], log: Log) -> None:
-    """One time axis, told at the bottom; it begins a step before the first entry."""
+    """One time axis, labelled at the bottom; it begins a step before the first entry."""
     for axes in page:
         axes.set_xlim(float(log.time[0]) - period(log), float(log.time[-1]) + period(log))
     for axes in page[:-1]:
@@ -112,7 +112,7 @@ def _mark_shifts(page: Sequence[Axes], log: Log, robot: int) -> None:
 
 
 def _mark_fall(page: Sequence[Axes], log: Log, robot: int) -> None:
-    """A veil over everything after a fall: the robot counts no more."""
+    """Greys out all rows after a fall."""
     time = fall_time(log, robot)
     if time is None:
         return

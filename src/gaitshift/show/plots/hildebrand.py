@@ -34,10 +34,10 @@ from gaitshift.show.plots.style import (
 )
 
 _RINGS = (1.0, 0.77, 0.54, 0.31)
-"""Radius of each foot's ring: feet that come down together lie side by side."""
+"""Radius of each foot's ring: feet that touch down together are side by side."""
 
 _NAMES = (PAPER, PAPER, INK, INK)
-"""Colour of each foot's name on its mark: the hind feet's are light."""
+"""Colour of each foot's name on its mark; light for the hind feet."""
 
 
 def draw_phase_circle(axes: Axes, figures: Mapping[str, Any], machine: RewardMachine) -> None:
@@ -101,16 +101,16 @@ def _draw_mean(
 
 
 SHOWN = 2.0
-"""Time that the diagram shows: the robot's last on its feet [s]."""
+"""Length of the diagram, up to the robot's last step on its feet [s]."""
 
 _SIZE = (12.0, 4.4)
 """[inch]"""
 
 _STRIP = 4.25
-"""Where the machine's states lie, below the lanes 0 to 3 of the feet."""
+"""Position of the machine's states, below the lanes 0 to 3 of the feet."""
 
 _LETTER = 0.0115
-"""Width of a letter in the strip, of the time shown."""
+"""Width of a letter in the strip, as a share of the time shown."""
 
 
 def hildebrand_diagram(
@@ -157,7 +157,7 @@ def hildebrand_diagram(
 
 
 def _pace(figures: Mapping[str, Any]) -> str:
-    """Speed and cycles of the machine, as far as they are known."""
+    """Speed and cycles of the machine, where known."""
     forms = {"speed_mean": "{:.2f} m/s", "cycles_per_s": "{:.2f} cycles/s"}
     known = [
         form.format(figures[name]) for name, form in forms.items() if figures[name] is not None
@@ -191,7 +191,7 @@ def _draw_feet(axes: Axes, log: Log, robot: int, figures: Mapping[str, Any]) -> 
 
 
 def _draw_states(axes: Axes, log: Log, robot: int, machine: RewardMachine, colour: str) -> None:
-    """A strip of the machine's states, light and dark in turn, with their feet where they fit."""
+    """A strip of the machine's states, alternately light and dark, with feet where they fit."""
     low, high = _STRIP - 0.22, _STRIP + 0.22
     for span in spans(log, log.machine_state[:, robot]):
         state = int(log.machine_state[span.entry, robot])

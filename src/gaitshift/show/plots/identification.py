@@ -1,4 +1,4 @@
-"""What identification found: a map over α and β, and ROC curves side by side."""
+"""Results of an identification: a map over α and β, and ROC curves."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
@@ -29,23 +29,23 @@ LINES = (
     *("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"),
     *("#7b4ea3", "#8c6d46", "#44aa99", "#882255", "#1f2933"),
 )
-"""After Okabe and Ito, and Tol; conditions are not gaits, and no figure shows both."""
+"""Colours after Okabe and Ito, and Tol; no figure shows both conditions and gaits."""
 
 LATEST = 6.0
-"""Delays are shaded up to here [m]."""
+"""Largest delay of the colour scale [m]."""
 
 FALSE = "#f3d9c4"
-"""Where robots shift that should not."""
+"""Colour of settings with false shifts."""
 
-NOTICED = "true positive rate: passages to detect, with a shift"
+DETECTED = "true positive rate: passages to detect, with a shift"
 OTHERS = "false positive rate: other passages, with a shift"
 """Axes of a ROC curve."""
 
 
 def condition_map(one: Judged, path: Path) -> Figure:
-    """Mean delay of a detection over α and β, where no robot shifted wrongly; and the choice.
+    """Mean delay of a detection over α and β, where there is no false shift, and the choice.
 
-    Of the recordings that chose; those that judged say what a step is.
+    The figures are those of the recordings for choosing.
     """
     check_target(path)
     tuned = one.tuned
@@ -104,7 +104,7 @@ def condition_map(one: Judged, path: Path) -> Figure:
 
 
 def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
-    """ROC curves of passages of a course against all others, a line a condition."""
+    """ROC curves of passages of a course against all others, one line per condition."""
     check_target(path)
     with house_style():
         figure = Figure(figsize=(9.2, 5.6))
@@ -134,7 +134,7 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
         axes.set_xlim(-0.01, 1.0)
         axes.set_ylim(0.0, 1.01)
         axes.set_xlabel(OTHERS)
-        axes.set_ylabel(NOTICED)
+        axes.set_ylabel(DETECTED)
         axes.set_title(f"passages of 3 m, {course} against the rest", loc="left", fontsize=12)
         figure.tight_layout()
         figure.subplots_adjust(right=0.6)
@@ -143,9 +143,9 @@ def roc_figure(judged: Sequence[Judged], course: str, path: Path) -> Figure:
 
 
 def roc(wanted: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the others, and of the wanted, with a shift at each α, the strictest first.
+    """False and true positive rates at each α, the strictest first.
 
-    Passages of one score come in together, as a slope, so that the area below counts ties by half.
+    Passages of equal score are one sloped segment, so that the area below counts ties by half.
     """
     levels = np.unique(np.concatenate([wanted, others]))[::-1]
     x = np.array([0.0, *[(others >= level).mean() for level in levels]])

@@ -37,21 +37,21 @@ from gaitshift.show.plots.style import (
 )
 
 Courses = Sequence[Float[np.ndarray, " _"]]
-"""One quantity over the iterations, an array a seed; a run that broke down has a shorter one."""
+"""One quantity over the iterations, an array per seed; that of a diverged run is shorter."""
 
 _SIZE = (7.5, 4.9)
-"""Of the rewards [inch]."""
+"""Size of the figure of rewards [inch]."""
 
 _PANEL = (3.75, 2.6)
-"""Of one comparison [inch]."""
+"""Size of one comparison [inch]."""
 
 _COMPARED = (INK, "#0072b2", "#d55e00")
-"""Colours of what is compared, the reference first."""
+"""Colours of the settings, the reference first."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Landmarks:
-    """What another's curves look like, in a few numbers."""
+    """Landmarks of published curves."""
 
     start: float
     """Reward at the first iteration."""
@@ -112,10 +112,10 @@ def reward_curves(rewards: Mapping[str, Courses], landmarks: Landmarks, path: Pa
 def comparison_curves(
     panels: Mapping[str, Mapping[str, Courses]], path: Path, *, aim: float
 ) -> Figure:
-    """Draws the speed of each setting over the iterations [m/s], a panel a question.
+    """Draws the speed of each setting over the iterations [m/s], one panel per question.
 
-    Lines are means over seeds, bands from the least to the greatest; dashed is the speed aimed at.
-    The first setting of a panel is the one that the others are held against.
+    Lines are means over seeds, bands from the least to the greatest; the dashed line is the
+    commanded speed. The first setting of a panel is its reference.
 
     Raises:
         GaitshiftError: another file ending, or no such folder.
@@ -165,11 +165,11 @@ def _draw_mean(
 REWARDS, COMPARISONS = "reward.png", "ablations.png"
 
 CONTACT_TIME = 2.0
-"""Length of a contact diagram [s], as in the paper's."""
+"""Length of a contact diagram [s], as in the paper."""
 
 
 def draw(results: Results, judged: list[JudgedPolicy], out: Path) -> list[str]:
-    """Draws what there is to draw into `out`; gives the names of the files."""
+    """Draws all available figures into `out`; returns the names of the files."""
     drawn: list[str] = []
     rewards = {gait: _columns(seeds, "reward") for gait, seeds in results.gaits()}
     rewards = {gait: curves for gait, curves in rewards.items() if curves}
@@ -219,5 +219,5 @@ def _panels(results: Results) -> Mapping[str, Mapping[str, Courses]]:
 
 
 def _columns(seeds: Seeds, column: str) -> Courses:
-    """One column of every run that has a curve at all."""
+    """One column of every run that has a curve."""
     return [getattr(curve, column) for curve in seeds.curves if len(curve)]

@@ -1,4 +1,4 @@
-"""Rows of figures, each one thing of one robot over time; the contact diagram, one row alone."""
+"""The rows of figures: each draws one quantity of one robot over time into one pair of axes."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
@@ -38,17 +38,17 @@ from gaitshift.show.plots.style import (
 )
 
 _SPEED_SIGMA = 0.2
-"""Of the window over the speed [s]: half a stride, so that the course is seen and not the steps."""
+"""Width of the window that smooths the speed [s]: half a stride, which hides single steps."""
 
 _LANE = 0.74
-"""Height of a contact bar, of the distance from one foot's lane to the next."""
+"""Height of a contact bar, as a share of the distance between lanes."""
 
 _ROOM = 0.07
-"""Shortest stretch that has words written in, of the time shown."""
+"""Shortest stretch with a label, as a share of the time shown."""
 
 
 def draw_gaits(axes: Axes, log: Log, robot: int) -> None:
-    """A band in the colour of the gait in force, with its name."""
+    """A band in the colour of the present gait, with its name."""
     colours = gait_colours(log.gaits)
     for name, span in gait_spans(log, robot):
         axes.axvspan(span.begin, span.end, color=colours[name], linewidth=0)
@@ -60,14 +60,14 @@ def draw_gaits(axes: Axes, log: Log, robot: int) -> None:
 
 
 def tint_gaits(axes: Axes, log: Log, robot: int) -> None:
-    """A breath of the gait's colour behind a row."""
+    """A pale background in the colour of the gait."""
     colours = gait_colours(log.gaits)
     for name, span in gait_spans(log, robot):
         axes.axvspan(span.begin, span.end, color=colours[name], alpha=0.07, linewidth=0, zorder=0)
 
 
 def draw_contacts(axes: Axes, log: Log, robot: int) -> None:
-    """A bar for each stance phase of each foot, in the colour of the gait it began in."""
+    """A bar for each stance phase of each foot, in the colour of the gait at its start."""
     colours = gait_colours(log.gaits)
     for leg in range(len(LEGS)):
         contact = log.sensed.contact[:, robot, leg]
@@ -82,7 +82,7 @@ def draw_contacts(axes: Axes, log: Log, robot: int) -> None:
 
 
 def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
-    """The h_i that the shift condition compares, each from the foot's first touch on."""
+    """The foot heights h_i of the shift condition, each from the foot's first touch on."""
     for leg, name in enumerate(LEGS):
         known = np.cumsum(log.sensed.contact[:, robot, leg]) > 0
         height, colour = 100 * log.touch_height[known, robot, leg], LEG_COLOURS[leg]
@@ -109,7 +109,7 @@ def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
 
 
 def draw_counter(axes: Axes, log: Log, robot: int) -> None:
-    """The counter k below the threshold that it is held against, and the threshold's value."""
+    """The counter k and its threshold, with the threshold's value."""
     k, threshold = log.k[:, robot], log.threshold[:, robot]
     axes.fill_between(log.time, k, color=QUIET, alpha=0.25, linewidth=0)
     axes.plot(log.time, k, color=INK, label="k")
@@ -125,7 +125,7 @@ def draw_counter(axes: Axes, log: Log, robot: int) -> None:
 
 
 def draw_speed(axes: Axes, log: Log, robot: int) -> None:
-    """Forward speed, at each step and smoothed, and the speed commanded."""
+    """Forward speed, at each step and smoothed, and the commanded speed."""
     speed = log.truth.forward_speed[:, robot]
     command = log.sensed.need("forward_speed_command", "the plot")[:, robot]
     course = smoothed(speed, period(log), _SPEED_SIGMA)

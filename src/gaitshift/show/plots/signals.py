@@ -1,4 +1,4 @@
-"""What figures and videos derive from a log: spans of time, speeds, the ground, smooth courses."""
+"""Quantities that figures and videos derive from a log: spans, speeds, ground, smooth courses."""
 
 from dataclasses import dataclass
 
@@ -10,28 +10,28 @@ from gaitshift.lab.log import Log
 from gaitshift.sim.terrain import Terrain
 
 _SAME_GROUND = 0.01
-"""Grounds that differ by no more below all feet are the same [m]."""
+"""Largest difference below the feet at which two grounds are the same [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Span:
-    """A stretch of time in which something stays as it is."""
+    """A stretch of time with a constant value."""
 
     begin: float
     """[s]"""
     end: float
     """[s]"""
     entry: int
-    """The log's entry that it begins with."""
+    """Index of its first entry in the log."""
 
     @property
     def middle(self) -> float:
-        """Half-way between them [s]."""
+        """The middle of the stretch [s]."""
         return (self.begin + self.end) / 2
 
 
 def check_robot(log: Log, robot: int) -> None:
-    """`GaitshiftError` unless the log has a course in time, and this robot."""
+    """`GaitshiftError` unless the log has at least two entries, and this robot."""
     steps, count = log.k.shape
     if steps < 2:
         raise GaitshiftError(f"a log must have 2 control steps or more to draw, got {steps}")
@@ -56,7 +56,7 @@ def period(log: Log) -> float:
 
 
 def spans(log: Log, values: Shaped[np.ndarray, " T"]) -> list[Span]:
-    """Stretches of equal values. An entry stands for the time until the next one."""
+    """Stretches of equal values. An entry is valid until the next one."""
     cuts = np.flatnonzero(values[1:] != values[:-1]) + 1
     entries = [0, *cuts.tolist()]
     times = [*log.time[entries].tolist(), float(log.time[-1]) + period(log)]
@@ -64,35 +64,35 @@ def spans(log: Log, values: Shaped[np.ndarray, " T"]) -> list[Span]:
 
 
 def gait_at(log: Log, robot: int, entry: int) -> str:
-    """Name of the gait in force."""
+    """Name of the present gait."""
     return log.gaits[int(log.gait[entry, robot])]
 
 
 def gait_spans(log: Log, robot: int) -> list[tuple[str, Span]]:
-    """The gaits one after the other, and when each was in force."""
+    """The gaits in order, with the time of each."""
     return [(gait_at(log, robot, s.entry), s) for s in spans(log, log.gait[:, robot])]
 
 
 def shift_times(log: Log, robot: int) -> list[float]:
-    """When another gait takes over [s], as long as the robot stands."""
+    """Times of the shifts before a fall [s]."""
     fell = fall_time(log, robot)
     starts = [span.begin for _, span in gait_spans(log, robot)[1:]]
     return [time for time in starts if fell is None or time < fell]
 
 
 def fall_time(log: Log, robot: int) -> float | None:
-    """When the robot fell [s], if it did."""
+    """Time of the robot's fall [s]; None without a fall."""
     fallen = np.flatnonzero(log.fallen[:, robot])
     return float(log.time[fallen[0]]) if fallen.size else None
 
 
 def has_condition(log: Log, robot: int) -> bool:
-    """Whether a shift condition was at work: logs hold zeros where none was."""
+    """Whether there was a shift condition; without one the log has zeros."""
     return bool((log.threshold[:, robot] > 0).any())
 
 
 def ground_of(log: Log) -> Terrain:
-    """The ground that the log keeps."""
+    """The ground in the log."""
     return Terrain(
         height=log.terrain_height,
         size=(float(log.terrain_size[0]), float(log.terrain_size[1])),
@@ -102,13 +102,13 @@ def ground_of(log: Log) -> Terrain:
 
 
 def walks_on_kept_ground(log: Log, robot: int) -> bool:
-    """Whether the ground that the log keeps is this robot's: of several it keeps the first."""
+    """Whether the ground in the log is this robot's; of several grounds a log has the first."""
     kept = ground_of(log).height_at(log.truth.foot_position_w[:, robot, :, :2])
     return bool(np.allclose(kept, _ground_below_feet(log, robot), atol=_SAME_GROUND))
 
 
 def ground_below(log: Log, robot: int) -> Float[np.ndarray, " T"]:
-    """Height of the ground below the base [m]; if the log does not keep it, below the feet."""
+    """Height of the ground below the base [m]; if it is not in the log, below the feet."""
     if walks_on_kept_ground(log, robot):
         return ground_of(log).height_at(log.truth.base_position_w[:, robot, :2])
     return _ground_below_feet(log, robot).mean(axis=1)
@@ -121,9 +121,9 @@ def _ground_below_feet(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
 def smoothed(values: Float[np.ndarray, " T"], step: float, sigma: float) -> Float[np.ndarray, " T"]:
     """Values every `step` [s], averaged in a Gaussian window of standard deviation `sigma` [s].
 
-    The window looks both ways, so nothing is delayed. Each point is the middle of the line that
-    fits best in its window (locally linear regression), so that a straight line stays one up to
-    its ends, where half of the window is empty.
+    The window is symmetric, so nothing is delayed. Each point is the value of the line that fits
+    best in its window (local linear regression), so that straight lines are preserved up to the
+    ends.
     """
     reach = int(np.ceil(3 * sigma / step))
     offset = np.arange(-reach, reach + 1)

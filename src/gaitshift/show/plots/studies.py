@@ -28,13 +28,13 @@ from gaitshift.show.plots.style import (
 )
 
 _ASIDE = 0.0015
-"""From one way's marks to the next's, so that none hides another [m]."""
+"""Offset between the marks of two ways, so that none hides another [m]."""
 
 _MARKS = ("o", "s", "^", "v", "D", "P", "X")
 
 
 def crossings_figure(rows: Sequence[Mapping[str, Any]], path: Path) -> Figure:
-    """Survival, distance, speed and cost of transport over the amplitude, a line a way.
+    """Survival, distance, speed and cost of transport over the amplitude, one line per way.
 
     Raises:
         GaitshiftError: there are no rows.
@@ -83,7 +83,7 @@ def _line(
     index: int,
     label: str,
 ) -> None:
-    """One way's figures with their intervals; those that are missing are left out."""
+    """One way's figures with their intervals; missing figures are left out."""
     name, half = columns
     rows = [row for row in rows if row[name] != ""]
     x = np.array([row["amplitude"] for row in rows]) + index * _ASIDE
@@ -108,10 +108,10 @@ def _line(
 
 
 _LEAST = 1e-4
-"""Share of failures from which a cell is shaded."""
+"""Least share of failures with a shade."""
 
 _CELL = 0.85
-"""Of the figure [inch]."""
+"""Size of the figure [inch]."""
 
 
 def transition_map(rows: Sequence[Mapping[str, Any]], path: Path) -> Figure:

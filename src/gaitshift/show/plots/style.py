@@ -1,4 +1,4 @@
-"""How every figure looks: its colours, one typeface, quiet axes."""
+"""The style of all figures: colours, typeface, axes."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
@@ -19,13 +19,13 @@ from PIL import Image
 from gaitshift.errors import GaitshiftError
 
 INK, QUIET, PALE, PAPER = "#1f2933", "#616e7c", "#e4e7eb", "#ffffff"
-"""Words and lines; words of less weight; grids; the ground they stand on."""
+"""Colours of text and lines, of secondary text, of grids, and of the background."""
 
 GROUND = "#b7a794"
-"""The terrain, in profile."""
+"""Colour of the terrain in profile."""
 
 LEG_COLOURS = ("#3b2f8f", "#8a5a00", "#9a93d8", "#dda63a")
-"""In the order of `LEGS`: left is violet, right is amber, front is dark, hind is light."""
+"""Colours in the order of `LEGS`: left is violet, right is amber, front is dark, hind is light."""
 
 _NAMED = {
     "trot": "#0072b2",
@@ -37,17 +37,16 @@ _NAMED = {
     "three_one": "#7b4ea3",
     "half_bound": "#8c6d46",
 }
-"""After Okabe and Ito (the first six; two of ours): told apart by every kind of colour vision."""
+"""After Okabe and Ito (the first six, and two more): distinct for every kind of colour vision."""
 
 _OTHERS = ("#44aa99", "#882255", "#999933", "#332288", "#661100")
-"""After Tol's muted scheme, for gaits that come from elsewhere."""
+"""After Tol's muted scheme, for gaits that are not shipped."""
 
 
 def gait_colours(names: Iterable[str]) -> dict[str, str]:
     """Colour of each gait: shipped gaits have their own, any other name always the same.
 
-    Where two other names would share one, the later takes the next that is free, as long as there
-    is one.
+    Where two other names share a colour, the later one takes the next free colour, if any.
     """
     colours: dict[str, str] = {}
     for name in names:
@@ -69,7 +68,7 @@ DPI = 160
 """Pixels an inch: a figure 10 inches wide has 1600 pixels."""
 
 DASHES = (0, (4, 2))
-"""Line style of what is asked for, beside what is done."""
+"""Line style of commanded values, beside measured ones."""
 
 _STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same words on every machine
@@ -104,13 +103,13 @@ _STYLE: dict[str, Any] = {
 
 @contextmanager
 def house_style() -> Generator[None]:
-    """Everything drawn inside looks alike, whatever the user's own settings are."""
+    """A context with this style, independent of the user's own settings."""
     with rc_context(cast(Any, _STYLE)):
         yield
 
 
 def check_target(path: Path) -> None:
-    """`GaitshiftError` unless a figure can be written to `path`: asked before the work is done."""
+    """`GaitshiftError` unless a figure can be written to `path`; called before any work."""
     if path.suffix.lower() not in FORMATS:
         raise GaitshiftError(f"{path}: the name of a figure must end in {' or '.join(FORMATS)}")
     if not path.parent.is_dir():
@@ -133,11 +132,11 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def name_row(axes: Axes, label: str) -> None:
-    """Labels the y axis in upright words at its upper end, where a telephone shows them too."""
+    """Labels the y axis horizontally at its upper end, so that it is legible on a small screen."""
     axes.set_ylabel(label, rotation=0, ha="left", va="bottom")
     axes.yaxis.set_label_coords(0.0, 1.04)
 
 
 def few_ticks(axes: Axes) -> None:
-    """Few numbers on the y axis, and round ones."""
+    """Few ticks on the y axis, at round numbers."""
     axes.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))

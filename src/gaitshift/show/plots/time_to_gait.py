@@ -1,4 +1,4 @@
-"""How soon each gait was there: a lane a gait, ours above the baseline, a dot a seed."""
+"""Time to each gait: one lane per gait, gaitshift above the baseline, one dot per seed."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
@@ -24,10 +24,11 @@ from gaitshift.show.plots.style import (
 )
 
 _WIDTH, _LANE, _MARGINS = 7.5, 1.15, 0.95
-"""Of the figure, of a gait's lane, and of what is above and below all lanes [inch]."""
+"""Width of the figure, and heights of a lane and of the margins above and below all lanes
+[inch]."""
 
 _ROWS = (-0.19, 0.19)
-"""Where ours and the baseline lie in a lane, of its height."""
+"""Positions of gaitshift and the baseline in a lane, as shares of its height."""
 
 _TICKS = (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400)
 """[s]"""
@@ -36,7 +37,7 @@ _TICKS = (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 7200, 14400)
 def time_to_gait_figure(outcomes: Sequence[Outcome], path: Path) -> Figure:
     """Draws the training time of every seed, the median, and the ratio of the medians.
 
-    Hollow with an arrow: given up there, without the gait.
+    A hollow dot with an arrow is a training that was stopped there without the gait.
 
     Raises:
         GaitshiftError: no outcomes, another file ending, or no such folder.

@@ -1,4 +1,4 @@
-"""The course of a training, from its `progress.csv`."""
+"""The learning curves of a training, from its `progress.csv`."""
 
 # matplotlib's own stubs leave **kwargs untyped:
 # pyright: reportUnknownMemberType=false
@@ -37,19 +37,19 @@ COURSES = (
 _NEEDED = ("iteration", "stage", "steps", "wall_s", *(column for column, _, _ in COURSES))
 
 _LIMITS = {"survival": (-4.0, 104.0)}
-"""Ends of the scale where the course does not give them."""
+"""Fixed ends of the scale, by column."""
 
 _SIZE = (7.5, 8.4)
 """[inch]"""
 
 _AVERAGED = 25
-"""Share of the training that the thick line averages over: one in this many iterations."""
+"""The thick line averages over one of this many parts of the training."""
 
 
 def training_curves(progress_csv: Path, path: Path) -> Figure:
     """Draws reward, speed, survival and changes a second over control steps and wall time.
 
-    Thin: each iteration; thick: a moving average. Grey bands tell the stages apart.
+    Thin: each iteration; thick: a moving average. Grey bands separate the stages.
 
     Raises:
         GaitshiftError: no such file, not a `progress.csv`, fewer than two iterations, another file
@@ -93,7 +93,7 @@ def read_progress(path: Path) -> list[dict[str, str]]:
 
 
 def numbers(table: list[dict[str, str]], column: str, path: Path) -> Float[np.ndarray, " n"]:
-    """A column of them; `path` is for errors."""
+    """A column of these lines; `path` is for errors."""
     try:
         return np.array([float(row[column]) for row in table])
     except (TypeError, ValueError) as error:
@@ -142,7 +142,7 @@ def _mark_stages(
 def _add_wall_time(
     axes: Axes, steps: Float[np.ndarray, " n"], wall: Float[np.ndarray, " n"]
 ) -> None:
-    """A second scale below the first: the minutes that the training took so far."""
+    """A second scale below the first: the training time so far [min]."""
     there, back = np.append(0.0, steps), np.append(0.0, wall)
 
     def minutes(x: ArrayLike) -> ArrayLike:

@@ -1,4 +1,4 @@
-"""What the player of a report is fed with, as JSON: arrays in base64, little-endian."""
+"""The input of a report's player, as JSON: arrays in base64, little-endian."""
 
 import base64
 from typing import Any, cast
@@ -22,16 +22,16 @@ from gaitshift.show.plots.style import GROUND, LEG_COLOURS, gait_colours
 from gaitshift.sim.terrain import Terrain
 
 EVERY = 2
-"""Control steps from picture to picture: 50 a second."""
+"""Control steps between two poses, 50 poses a second."""
 
 _AROUND = 3.0
-"""Ground that is drawn around the robot's course [m]."""
+"""Width of the drawn ground around the robot's course [m]."""
 
 _TYPES = {"f4": "<f4", "u4": "<u4", "u1": "u1"}
 
 
 def run_data(log: Log, robot: int, description: Robot) -> dict[str, Any]:
-    """One robot of a log of such robots.
+    """One robot of a log, as data.
 
     `time` [s], `contact` (bit i: foot i of `LEGS` is down) and `gait` have an entry a control step;
     `position` and `rotation` (w, x, y, z) of each of the `bodies`, `feet` and the corners of the
@@ -78,12 +78,12 @@ def run_data(log: Log, robot: int, description: Robot) -> dict[str, Any]:
 
 
 def title_of(gait: str) -> str:
-    """Name of a gait for people."""
+    """Title of a gait."""
     return gaits.load(gait).title if gait in gaits.names() else gait
 
 
 def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
-    """The charts, from the top down; those of the condition only where one was at work."""
+    """The charts from top to bottom; those of the condition only if there was one."""
     contacts = {"kind": "contacts", "title": "feet on the ground", "names": list(LEGS)}
     rows = [contacts]
     if has_condition(log, robot):
@@ -121,7 +121,7 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
 
 
 def _since_touched(log: Log, robot: int) -> Float[np.ndarray, "T 4"]:
-    """Heights of the last touches; NaN of a foot that has not touched yet."""
+    """Heights of the last touches; NaN for a foot that has not touched yet."""
     return log.touch_height[:, robot]
 
 
@@ -143,7 +143,7 @@ def lines(
 def series(
     name: str, values: Shaped[np.ndarray, " T"], colour: str, *, fill: bool = False
 ) -> dict[str, Any]:
-    """A line of a chart, with an entry for each of the times."""
+    """A line of a chart, with one entry per time."""
     return {"name": name, "values": packed(values, "f4"), "colour": colour, "fill": fill}
 
 
@@ -153,7 +153,7 @@ def _plane(touch_w: Float[np.ndarray, "4 3"]) -> Float[np.ndarray, "4 3"]:
 
 
 def _around(ground: Terrain, course: Float[np.ndarray, "T 2"]) -> Terrain:
-    """The part of a ground about a course; level ground goes on beyond its border."""
+    """The part of a ground around a course; level ground extends beyond its border."""
     low, high = course.min(axis=0) - _AROUND, course.max(axis=0) + _AROUND
     if ground.is_flat:
         return Terrain(
@@ -188,6 +188,6 @@ def _ground(ground: Terrain) -> dict[str, Any]:
 
 
 def packed(values: np.ndarray, kind: str) -> dict[str, str]:
-    """An array as the player unpacks it: f4, u4 or u1, little-endian, in base64."""
+    """An array in the format of the player: f4, u4 or u1, little-endian, in base64."""
     array = np.ascontiguousarray(values, dtype=_TYPES[kind])
     return {"type": kind, "data": base64.b64encode(array.tobytes()).decode("ascii")}

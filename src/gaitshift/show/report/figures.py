@@ -1,4 +1,4 @@
-"""Figures that people can hover over and zoom into, as the page's script wants them."""
+"""Data of interactive figures for the page's script."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,21 +11,21 @@ from jaxtyping import Float, Int, Shaped
 from gaitshift.show.report.data import packed
 
 Tick = tuple[int, str, str | None]
-"""Cell, its label, and a colour other than that of words."""
+"""Index of a cell, its label, and a colour other than that of text."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Axis:
-    """One side of a heat map, a cell a value."""
+    """One axis of a heat map, with one value per cell."""
 
     name: str
-    """With its unit, for beside the map."""
+    """Label with the unit."""
     short: str
-    """Said before a value that is read off."""
+    """Short name before a value in the readout."""
     values: tuple[str, ...]
-    """Of each cell, as they are said."""
+    """Text of the value of each cell."""
     ticks: tuple[Tick, ...]
-    """Cells that are named along the side."""
+    """Cells with a label on the axis."""
 
     @classmethod
     def of_numbers(
@@ -58,28 +58,28 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True)
 class Category:
-    """Cells that have no shade but the colour of their kind."""
+    """Cells with a fixed colour for their kind in place of a shade."""
 
     name: str
-    """Said of such a cell."""
+    """Label of such a cell."""
     colour: str
-    """Of the cells; "pale" goes with the theme."""
+    """Colour of the cells; "pale" follows the theme."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Said:
-    """A figure of each cell that is told when it is pointed at."""
+    """A quantity of each cell, shown on hover."""
 
     name: str
-    """Said before it."""
+    """Label before the value."""
     values: Shaped[np.ndarray, "Y X"] | Sequence[str]
-    """Numbers, or texts row by row; NaN and empty texts are passed over."""
+    """Numbers, or texts row by row; NaN and empty texts are left out."""
     digits: int = 0
     """Decimals of numbers."""
     unit: str = ""
-    """Said after it."""
+    """Unit after the value."""
     of: Shaped[np.ndarray, "Y X"] | None = None
-    """Told as "… of" these."""
+    """Totals, shown as "… of TOTAL"; None: no totals."""
 
     def to_dict(self) -> dict[str, Any]:
         """As the script wants it."""
@@ -110,18 +110,18 @@ def heat_map(
     """A heat map: row 0 is at the bottom.
 
     Args:
-        title: for those who cannot see it.
-        x: across.
-        y: up.
-        shade: what cells of kind 0 are shaded by.
-        scale: what the shades mean, with unit.
+        title: text alternative.
+        x: horizontal axis.
+        y: vertical axis.
+        shade: values that shade the cells of kind 0.
+        scale: label of the shades, with unit.
         span: the values of the first and of the last of the stops.
         stops: colours from low to high.
         kind: 0, or 1 + index in `kinds`.
-        kinds: what cells without a shade are.
-        says: what is told of a cell.
-        chosen: cell that is marked, and told of while nothing is pointed at: across, up.
-        words: written into the cells, row by row, which are square then.
+        kinds: the kinds of cells without a shade.
+        says: quantities of a cell, shown on hover.
+        chosen: marked cell (column, row), which is described while no cell is hovered over.
+        words: texts in the cells, row by row; the cells are then square.
     """
     return {
         "figure": "map",
@@ -143,22 +143,22 @@ def heat_map(
 
 @dataclass(frozen=True, kw_only=True)
 class Curve:
-    """Steps over the unit square."""
+    """A step curve in the unit square."""
 
     name: str
     """Said before its value."""
     label: str
-    """In the legend."""
+    """Text in the legend."""
     colour: str
     """Of the line."""
     x: Float[np.ndarray, " n"]
     """Rising, 0 to 1."""
     y: Float[np.ndarray, " n"]
-    """From each x to the next, 0 to 1."""
+    """Values from each x to the next, 0 to 1."""
 
 
 def curves(*, title: str, x: str, y: str, series: Sequence[Curve]) -> dict[str, Any]:
-    """Curves side by side, with the names of the axes."""
+    """Several curves in one figure, with the names of the axes."""
     return {
         "figure": "curves",
         "title": title,

@@ -17,10 +17,10 @@ from gaitshift.show.report.data import run_data, title_of
 from gaitshift.show.report.page import Row, facts_table, table, write_page
 
 MOST_VIDEO = 6_000_000
-"""A video of more bytes is left out: the page would grow beyond what opens quickly."""
+"""Largest video on a page [bytes], so that the page opens quickly; a larger one is left out."""
 
 _LEAST_STRETCH = 3.0
-"""A gait is judged where it was in force for this long [s]; the first second is left out."""
+"""Least time in a gait for a verdict [s]; the first second is left out."""
 
 
 def write_report(
@@ -40,7 +40,7 @@ def write_report(
         robot: whose run.
         description: of the robots of the log.
         video: an mp4 to show beside it, where it is not too large.
-        facts: what made the run, in words, by name.
+        facts: settings of the run, as text by name.
 
     Raises:
         GaitshiftError: a robot that is not in the log, or a log of another kind of robot.

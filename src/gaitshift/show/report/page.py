@@ -1,4 +1,4 @@
-"""The page of a report: one HTML file that asks for nothing else, and opens from disk."""
+"""The page of a report: one self-contained HTML file that opens from disk."""
 
 import html
 import json
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 Row = tuple[Sequence[str], float | None]
-"""Cells of a row, and the time that a click on it leads to [s]."""
+"""Cells of a row, and the time to which a click on it seeks [s]."""
 
 
 def write_page(
@@ -30,7 +30,7 @@ def write_page(
         sections: headings and HTML, from the top down; empty ones are left out.
         walks: names and data (`run_data`) of what the player shows, which stands first; several are
             chosen from. Without any there is no player.
-        course: charts over something else than time, which stand before the sections.
+        course: charts that are not over time, before the sections.
         figures: data (`report.figures`) of the figures in the sections, where `figure` put them;
             for pages without a player.
     """
@@ -66,7 +66,7 @@ def figure(name: str) -> str:
 
 
 def _stage(names: Sequence[str]) -> str:
-    """The player, and above it what there is to choose from."""
+    """The player, with a choice of walks above it."""
     options = "".join(
         f"<option value='{i}'>{html.escape(name)}</option>" for i, name in enumerate(names)
     )
@@ -93,7 +93,7 @@ def table(head: Sequence[str], rows: Sequence[Row]) -> str:
 
 
 def facts_table(*some: Mapping[str, str] | None) -> str:
-    """What made it, and the versions that wrote the page."""
+    """Settings of the run, and the versions that wrote the page."""
     made = {f"{name} version": version(name) for name in ("gaitshift", "mujoco-core", "numpy")}
     given = [each for each in (*some, made) if each]
     return table((), [((n, str(value)), None) for each in given for n, value in each.items()])

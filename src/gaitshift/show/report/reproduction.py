@@ -43,10 +43,10 @@ def write_report(
     earlier: EarlierRuns | None = None,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Writes all that the runs at hand say into `out`; gives the same as plain data.
+    """Writes the report of the finished runs into `out`; returns the same as plain data.
 
     Args:
-        results: the runs that are over.
+        results: the finished runs.
         runs: their folders.
         out: the folder of the report.
         earlier: runs in the tables of an earlier report, whose folders may be gone.
@@ -85,7 +85,7 @@ def _readme(
     ablations: list[Row],
     written: list[str],
 ) -> str:
-    parts = ["# Reproduction of the paper", _introduction(results)]
+    parts = ["# Which statements of the paper hold?", *_answer(found), _introduction(results)]
     if found:
         parts += ["## Verdicts", _verdicts(found)]
         parts += [
@@ -107,6 +107,18 @@ def _readme(
     return "\n\n".join(parts) + "\n"
 
 
+def _answer(found: list[Finding]) -> list[str]:
+    """How many statements hold, in one sentence; no sentence where none is tested."""
+    if not found:
+        return []
+    verdicts = [finding.verdict for finding in found]
+    return [
+        f"Of {len(found)} statements {verdicts.count('holds')} hold, "
+        f"{verdicts.count('holds in part')} hold in part, and "
+        f"{verdicts.count('does not hold')} do not hold."
+    ]
+
+
 def _introduction(results: Results) -> str:
     plan = results.plan
     recipe = plan.jobs[0].recipe
@@ -119,9 +131,10 @@ def _introduction(results: Results) -> str:
             f"Each run has {recipe.robots} robots × {recipe.steps} steps × {recipe.iterations} "
             "iterations on flat ground at 100 Hz, with the rewards of Table I, b = 200, and the "
             f"network and PPO settings of the paper; there are {plan.seeds} seeds for each gait.",
-            "Three choices are ours: gains of 80/2, because Kp = 3 cannot hold this robot up (see "
-            f"the ablation); a lock-out of {LOCKOUT} steps between two changes of the machine's "
-            "state, as the published plateau implies; and a bonus that is added to the reward.",
+            "Three settings depart from the paper: gains of 80/2, because Kp = 3 cannot hold this "
+            f"robot up (see the ablation); a lock-out of {LOCKOUT} steps between changes of the "
+            "machine's state, as the published plateau implies; and a bonus that is added to the "
+            "reward.",
             f"Each ablation changes one setting of trot, over {plan.ablation_seeds} seeds and "
             f"{plan.ablation_iterations} iterations, against the same of the reference.",
             f"A run *walks* from the first of {HELD_FOR} successive iterations with a mean speed "

@@ -1,4 +1,4 @@
-"""The pages of studies: what `identify` and `transitions` found, to hover over and zoom into."""
+"""The pages of studies: interactive results of `identify` and `transitions`."""
 
 import html
 from collections.abc import Mapping, Sequence
@@ -17,19 +17,19 @@ from gaitshift.lab.identification.report import (
     course_rows,
     hardest_first,
 )
-from gaitshift.lab.studies.transitions import HEAD, row_cells
-from gaitshift.show.plots.identification import FALSE, LATEST, LINES, NOTICED, OTHERS, roc
+from gaitshift.lab.studies.transitions import HEAD, TITLE, answer, row_cells, succeeded
+from gaitshift.show.plots.identification import DETECTED, FALSE, LATEST, LINES, OTHERS, roc
 from gaitshift.show.plots.style import gait_colours
 from gaitshift.show.report.data import title_of
 from gaitshift.show.report.figures import Axis, Category, Curve, Said, curves, heat_map
 from gaitshift.show.report.page import facts_table, figure, table, write_page
 from gaitshift.table import Row
 
-_NOTICED = {
+_PASSAGES = {
     "rough": "rough ground against others",
     "flat": "level ground against rough ground",
 }
-"""What ROC curves are about, by what is to be noticed."""
+"""Passages of the ROC curves, by the way."""
 
 _FALSE = Category(name="false shifts", colour=FALSE)
 _MISSED = Category(name="most passages missed", colour="pale")
@@ -38,7 +38,7 @@ _MISSED = Category(name="most passages missed", colour="pale")
 def write_identification_page(
     judged: Sequence[Judged], path: Path, *, title: str, words: str, command: str
 ) -> None:
-    """Writes the page of an identification: ROC curves, and a map and a table a condition.
+    """Writes the page of an identification: ROC curves, and a map and a table per condition.
 
     Args:
         judged: the conditions.
@@ -55,7 +55,7 @@ def write_identification_page(
         figures[f"roc{index}"] = _roc(judged, course)
     folded = [_folded(course, figure(f"roc{i}"), i == 0) for i, course in enumerate(met)]
     if folded:
-        sections.append((f"Passages of {_NOTICED[judged[0].tuned.way]}", "".join(folded)))
+        sections.append((f"Passages of {_PASSAGES[judged[0].tuned.way]}", "".join(folded)))
     folded = list[str]()
     for index, one in enumerate(judged):
         inner = f"<p>{html.escape(one.tuned.candidate.note.capitalize())}.</p>"
@@ -74,7 +74,7 @@ def write_identification_page(
 
 
 def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> None:
-    """Writes the page of shifts: a map and a table a ground.
+    """Writes the page of shifts: a map and a table per ground.
 
     Args:
         rows: of the table of shifts (`studies.transitions.row_of`).
@@ -85,17 +85,17 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
     sections: list[tuple[str, str]] = []
     for index, ground in enumerate(dict.fromkeys(row["ground"] for row in rows)):
         of = [row for row in rows if row["ground"] == ground]
-        total, good = (sum(row[name] for row in of) for name in ("switches", "successes"))
         figures[f"ground{index}"] = _transition_map(of)
-        said = f"<p>{good} of {total} shifts succeeded.</p>"
         cells = [(row_cells(row), None) for row in of]
-        content = said + figure(f"ground{index}") + table(HEAD, cells)
+        count = f"<p>{succeeded(of)} shifts succeeded.</p>"
+        content = count + figure(f"ground{index}") + table(HEAD, cells)
         sections.append((f"On {ground}", content))
     sections.append(("Settings", facts_table({"command": command})))
     write_page(
         path,
-        title="Gait shifts at a random phase",
-        summary="Policy and reward machine are swapped at a random phase of the old gait's stride. "
+        title=TITLE,
+        summary=f"{answer(rows)} "
+        "Policy and reward machine are swapped at a random phase of the old gait's stride. "
         "A shift succeeds if the robot does not fall within 5 s and shows the new gait.",
         sections=sections,
         figures=figures,
@@ -103,9 +103,9 @@ def write_transition_page(rows: Sequence[Row], path: Path, *, command: str) -> N
 
 
 def _titled(cells: tuple[str, ...]) -> str:
-    name, alpha, beta, seconds, metres, leak, noticed, delay, false, *_ = cells
+    name, alpha, beta, seconds, metres, leak, detected, delay, false, *_ = cells
     numbers = f"α {alpha}, β {beta} ({seconds or '–'} s, {metres or '–'} m), leak {leak}"
-    return f"{name}: {numbers}: detected {noticed}, delay {delay or '–'} m; {false} false"
+    return f"{name}: {numbers}: detected {detected}, delay {delay or '–'} m; {false} false"
 
 
 def _folded(title: str, inner: str, opened: bool) -> str:
@@ -128,7 +128,7 @@ def _condition_map(one: Judged) -> dict[str, Any]:
         kind=kind,
         kinds=(_FALSE, _MISSED),
         says=(
-            Said(name="noticed", values=tally.detected, of=tally.came),
+            Said(name="detected", values=tally.detected, of=tally.came),
             Said(name="after", values=tally.delay_m, digits=2, unit="m"),
             Said(name="or", values=tally.delay_s, digits=2, unit="s"),
             Said(name="false shifts", values=tally.fired),
@@ -155,7 +155,7 @@ def _roc(judged: Sequence[Judged], course: str) -> dict[str, Any]:
     return curves(
         title=f"ROC curves on {course}",
         x=OTHERS,
-        y=NOTICED,
+        y=DETECTED,
         series=[curve for _, curve in series],
     )
 
@@ -168,7 +168,7 @@ def _transition_map(rows: Sequence[Row]) -> dict[str, Any]:
     count = len(gaits)
     failed = np.zeros((count, count))
     kind = np.full((count, count), 2)
-    told: dict[str, list[str]] = {name: [""] * count**2 for name in HEAD[2:]}
+    cells: dict[str, list[str]] = {name: [""] * count**2 for name in HEAD[2:]}
     words = [""] * count**2
     for row in rows:
         j, i = count - 1 - gaits.index(row["old"]), gaits.index(row["new"])
@@ -176,8 +176,8 @@ def _transition_map(rows: Sequence[Row]) -> dict[str, Any]:
         failed[j, i] = failures / row["switches"]
         kind[j, i] = 0 if failures else 1
         words[j * count + i] = str(failures)
-        for name, cell in zip(told, row_cells(row)[2:], strict=True):
-            told[name][j * count + i] = cell
+        for name, cell in zip(cells, row_cells(row)[2:], strict=True):
+            cells[name][j * count + i] = cell
     return heat_map(
         title=f"Failed shifts on {rows[0]['ground']}",
         x=Axis.of_names("to", dict(titles)),
@@ -191,6 +191,6 @@ def _transition_map(rows: Sequence[Row]) -> dict[str, Any]:
             Category(name="none failed", colour="#cfe3d6"),
             Category(name="not tried", colour="pale"),
         ),
-        says=[Said(name=name, values=values) for name, values in told.items()],
+        says=[Said(name=name, values=values) for name, values in cells.items()],
         words=words,
     )

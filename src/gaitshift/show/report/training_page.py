@@ -1,4 +1,4 @@
-"""The page of a training: what its policies do, its course, its verdicts."""
+"""The page of a training: walks of its policies, learning curves, verdicts."""
 
 import json
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ def _walks(walks: Sequence[tuple[str, Log]], robot: Robot) -> list[Row]:
 
 
 def _course(progress: Path) -> dict[str, Any]:
-    """What the player draws over the iterations: each of them, and where a stage ends."""
+    """Data of the learning curves for the player, with the ends of the stages."""
     rows = read_progress(progress)
     stages = [row["stage"] for row in rows]
     iteration = numbers(rows, "iteration", progress)
@@ -76,7 +76,7 @@ def _course(progress: Path) -> dict[str, Any]:
 
 
 def _verdicts(path: Path) -> str:
-    """The verdicts that the training wrote down on its way, if it did."""
+    """The verdicts of the training, if any."""
     if not path.is_file():
         return ""
     found = read(path, may_be_cut=True)

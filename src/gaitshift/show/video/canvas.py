@@ -1,4 +1,4 @@
-"""Pictures of a model, drawn by OpenGL into arrays, and the camera that follows a robot."""
+"""Pictures of a model, rendered by OpenGL into arrays, and the camera that follows a robot."""
 
 import os
 import sys
@@ -17,23 +17,23 @@ from gaitshift.show.plots.signals import period, smoothed
 _MAX_GEOMS = 2000
 
 _GLOW = 0.35
-"""Light that a ball gives by itself: with what falls on it, it shows about its own colour."""
+"""Emission of a ball, so that together with the scene's light it has about its own colour."""
 
 _FONT = mujoco.mjtFontScale.mjFONTSCALE_100.value
 
 
 class VideoUnavailable(GaitshiftError):  # noqa: N818  a state of the machine, not a mistake
-    """Videos cannot be made on this machine; everything else works on it all the same."""
+    """Videos cannot be made on this machine; nothing else depends on them."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Camera:
-    """Where a camera stands and looks."""
+    """Position and direction of a camera."""
 
     target: tuple[float, float, float]
     """World point in the middle of the picture [m]."""
     distance: float
-    """Of the camera from there [m]."""
+    """Distance of the camera from there [m]."""
     azimuth: float
     """Heading in which it looks, about world z [degree]."""
     elevation: float
@@ -42,7 +42,7 @@ class Camera:
 
 @dataclass(frozen=True, kw_only=True)
 class Ball:
-    """A ball that glows by itself, drawn over the model."""
+    """A ball that emits light, drawn over the model."""
 
     position: Float[np.ndarray, " 3"]
     """Centre, world frame [m]."""
@@ -55,8 +55,8 @@ class Ball:
 class Canvas:
     """Draws one model in one size; one at a time, to be closed when done.
 
-    Raises `VideoUnavailable` where there is no OpenGL. `MUJOCO_GL` is obeyed where it is set; where
-    it is not, Linux without a display draws by EGL, which needs no screen.
+    Raises `VideoUnavailable` where there is no OpenGL. `MUJOCO_GL` selects the backend. Without it,
+    Linux without a display uses EGL, which needs no screen.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
@@ -86,7 +86,7 @@ class Canvas:
         self._gl.free()
 
     def upload_texture(self, texture: int) -> None:
-        """Shows what has been written into the model's `tex_data` since."""
+        """Uploads the present content of the model's `tex_data`."""
         mujoco.mjr_uploadTexture(self._model, self._context, texture)
 
     def draw(
@@ -140,18 +140,18 @@ _DISTANCE = 2.25
 """[m]: the robot fills about a quarter of the picture's width."""
 
 _AZIMUTH, _ELEVATION = 58.0, -18.0
-"""Seen from its right and a little from behind, so that the ground ahead is in the picture."""
+"""View from the robot's right and slightly from behind, so that the ground ahead is visible."""
 
 _LOWER = 0.14
-"""How far below the base the middle of the picture is [m]: half-way to the feet."""
+"""Distance of the middle of the picture below the base [m]: half-way to the feet."""
 
 _ALONG, _UP, _TURN = 0.5, 1.0, 1.5
-"""Windows that the course is smoothed in, over the ground, in height and in heading [s]: longer
-than a stride, so that the camera does not bob with the body."""
+"""Windows that smooth the course over the ground, in height and in heading [s]; longer than a
+stride, so that the camera does not follow the body's oscillation."""
 
 
 def follow(log: Log, robot: int) -> list[Camera]:
-    """The camera that walks along with a robot, calmly, at each entry of the log."""
+    """The camera that follows a robot smoothly, at each entry of the log."""
     step = period(log)
     x, y, z = log.truth.base_position_w[:, robot, :3].T
     yaw = smoothed(np.unwrap(log.sensed.yaw[:, robot]), step, _TURN)

@@ -1,4 +1,4 @@
-"""A log as an MP4 file: the robot on its ground, and below it what the shift condition sees."""
+"""A log as an MP4 file: the robot on its ground, and the signals of the shift condition below."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -80,7 +80,7 @@ class FilmWriter:
 
 
 _GLOW = 1.3
-"""Radius of the light on a foot that touches, of the foot's own."""
+"""Radius of the light on a foot in contact, as a multiple of the foot's radius."""
 
 
 class Playback:
@@ -127,7 +127,7 @@ class Playback:
         self._printed = entry + 1
 
     def _lights(self, entry: int) -> list[Ball]:
-        """A light on each foot that touches, in the gait's colour."""
+        """A light on each foot in contact, in the gait's colour."""
         feet = self._log.truth.foot_position_w[entry, self._robot] + [0.0, 0.0, self._radius]
         red, green, blue = (v / 255 for v in ImageColor.getrgb(self._colour(entry))[:3])
         return [
@@ -162,15 +162,13 @@ def render(
 ) -> None:
     """Writes an MP4 video (H.264) of one robot from `t0` to `t1` [s], in a log of such robots.
 
-    Feet that touch glow in the colour of the gait and leave prints; the strip below tells the gait,
-    k against its threshold, the forward speed and the time. `report` is called with the pictures
-    done and in all.
+    Feet in contact glow in the colour of the gait and leave prints. The strip below shows the gait,
+    k and its threshold, the forward speed and the time. `report` is called with the number of
+    pictures done and the total.
 
-    Raises:
-        VideoUnavailable: no OpenGL, or no ffmpeg, on this machine.
-        GaitshiftError: no such robot, a log of another kind of robot, nothing in that time, a
-            robot whose ground the log does not keep, a size or rate that makes no video, another
-            file ending, or no such folder.
+    Raises: VideoUnavailable: no OpenGL, or no ffmpeg, on this machine. GaitshiftError: no such
+    robot, a log of another kind of robot, an empty time span, a robot whose ground is not in the
+    log, an invalid size or rate, another file ending, or no such folder.
     """
     _check_target(path, width, height, fps)
     _check_log(log, robot, description)
@@ -211,13 +209,13 @@ def _check_log(log: Log, robot: int, description: Robot) -> None:
 
 
 def _entries(log: Log, fps: int) -> list[int]:
-    """The entry that each picture shows."""
+    """The entry of each picture."""
     times = np.arange(log.time[0], log.time[-1] + 1e-9, 1 / fps)
     return np.searchsorted(log.time, times - 1e-9).tolist()
 
 
 def _readings(log: Log, robot: int) -> list[Reading]:
-    """What the strip tells at each entry."""
+    """The content of the strip at each entry."""
     colours = gait_colours(log.gaits)
     speed = smoothed(log.truth.forward_speed[:, robot], period(log), _SPEED_SIGMA)
     gaits = [gait_at(log, robot, entry) for entry in range(len(log.time))]

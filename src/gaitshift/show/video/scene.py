@@ -1,4 +1,4 @@
-"""The model to look at: the robot, light, sky, and the ground with a picture painted on it."""
+"""The rendered model: the robot, light, sky, and the ground with a painted texture."""
 
 from dataclasses import dataclass
 
@@ -21,28 +21,28 @@ _HORIZON, _ZENITH = (0.93, 0.95, 0.97), (0.55, 0.68, 0.84)
 """Colours of the sky (red, green, blue)."""
 
 _FOG = (5.0, 13.0)
-"""Where the ground begins to fade into the horizon, and where it is gone [m]."""
+"""Distances at which the ground begins to fade, and at which it is invisible [m]."""
 
 _FOG_CELL = 0.5
 """Distance of the samples of level ground [m]."""
 
 _REACH = 14.0
-"""How far the scene goes beyond the robot's course [m]: just further than one sees."""
+"""Extent of the scene beyond the robot's course [m]: just beyond the visible range."""
 
 _TEXELS = 1_200_000
-"""Most points of the picture on the ground: it is drawn anew for each frame."""
+"""Largest number of points of the ground's texture, which is painted for each frame."""
 
 _FINEST = 64.0
-"""Most of them a metre."""
+"""Largest number of these points per metre."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A robot's model on a ground that can be painted on."""
+    """A robot's model on a ground with a texture that can be painted."""
 
     model: mujoco.MjModel
     terrain: Terrain
-    """The part of the ground that can be seen."""
+    """The visible part of the ground."""
     texture: int
     """Id of the ground's texture."""
 
@@ -117,7 +117,7 @@ def _set_look(spec: mujoco.MjSpec, width: int, height: int) -> None:
 
 
 def _around(terrain: Terrain, course: Float[np.ndarray, "T 2"]) -> Terrain:
-    """The part of a terrain in sight of the course; level ground goes on beyond its border."""
+    """The part of a terrain in sight of the course; level ground extends beyond its border."""
     (left, back), (right, front) = course.min(axis=0) - _REACH, course.max(axis=0) + _REACH
     if terrain.is_flat:
         return Terrain(
@@ -139,7 +139,7 @@ def _around(terrain: Terrain, course: Float[np.ndarray, "T 2"]) -> Terrain:
 
 
 def _fog_grid(length: float, width: float) -> tuple[int, int]:
-    """Rows and columns of level ground: fog is reckoned at the samples, and straight between."""
+    """Rows and columns of level ground: OpenGL computes fog at the samples and interpolates."""
     return int(np.ceil(width / _FOG_CELL)) + 1, int(np.ceil(length / _FOG_CELL)) + 1
 
 
@@ -160,22 +160,23 @@ _LOW, _HIGH = np.array([126.0, 141.0, 134.0]), np.array([244.0, 232.0, 210.0])
 """Colours of the lowest and the highest ground (red, green, blue)."""
 
 _RELIEF = 0.24
-"""Least difference in height between the two [m], so that ripples do not look like mountains."""
+"""Least difference in height between the two [m], so that small ripples keep a similar colour."""
 
 _SQUARE, _CONTRAST = 0.5, 0.07
-"""Side of the squares by which one sees the ground move [m]; how much darker every other is."""
+"""Side of the squares that show the motion of the ground [m], and how much darker every other
+is."""
 
 _SHADE, _BLUR = 0.42, 0.025
-"""How much light the shadow takes, and how soft its edge is [m]."""
+"""Darkness of the shadow, and width of its soft edge [m]."""
 
 _PATCH = 1.4
-"""Half side of the square around the robot that its shadow lies in [m]."""
+"""Half side of the square around the robot that contains its shadow [m]."""
 
 _PRINT, _OPACITY = 0.045, 165
 """Radius of a footprint [m], and how much of the ground it covers, of 255."""
 
 _SMOOTH = 4
-"""A footprint is a few points wide: drawn so many times as large and shrunk, it is round."""
+"""Oversampling of a footprint, which is only a few points wide, so that it is round."""
 
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
@@ -201,7 +202,7 @@ class Paint:
         self._solid = np.flatnonzero((model.geom_group <= 2) & (model.geom_bodyid > 0))
 
     def add_footprint(self, xy: Float[np.ndarray, " 2"], colour: str) -> None:
-        """Leaves a mark [m] that stays."""
+        """Leaves a permanent mark [m]."""
         window, patch, corner = self._cut(self._dry, xy, 2 * _PRINT)
         middle, reach = self._texel(xy) - corner, _PRINT * self._fine
         large = Image.new("L", (_SMOOTH * patch.width, _SMOOTH * patch.height))
@@ -212,7 +213,7 @@ class Paint:
         self._shown[window] = self._dry[window]
 
     def move_shadow(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """Lays the shadow of the robot's visible parts where the sun casts it."""
+        """Paints the shadow of the robot's visible parts."""
         if self._wet is not None:
             self._shown[self._wet] = self._dry[self._wet]
         corners = self._cast(model, data)
@@ -241,7 +242,7 @@ class Paint:
         return (colour * (1.0 - _CONTRAST * odd[..., None])).astype(np.uint8)
 
     def _cast(self, model: mujoco.MjModel, data: mujoco.MjData) -> Float[np.ndarray, "geoms 8 2"]:
-        """World x, y of the shadow's corners [m]: eight of each part's box, laid on the ground."""
+        """World x, y of the shadow's corners [m]: eight per part's box, on the ground."""
         boxes, rotation = model.geom_aabb[self._solid], data.geom_xmat[self._solid]
         local = boxes[:, None, :3] + boxes[:, None, 3:] * _CORNERS
         corners = np.einsum("gij,gcj->gci", rotation.reshape(-1, 3, 3), local)
@@ -262,9 +263,9 @@ class Paint:
         xy: Float[np.ndarray, " 2"],
         reach: float,
     ) -> tuple[tuple[slice, slice], Image.Image, Float[np.ndarray, " 2"]]:
-        """The square of half side `reach` [m] around a point: its place, a copy, its corner.
+        """The square of half side `reach` [m] around a point: its slices, a copy, its corner.
 
-        Only what lies on the ground of it; where nothing does, one texel of the rim.
+        It is cut at the border of the texture; outside, it is one texel at the border.
         """
         rows, columns = picture.shape[:2]
         low = np.clip(np.floor(self._texel(xy - reach)), 0, (columns - 1, rows - 1)).astype(int)

@@ -11,10 +11,10 @@ from PIL import Image, ImageDraw, ImageFont
 from gaitshift.show.plots.style import INK, PAPER, QUIET
 
 _SHARE = 0.125
-"""Height of the strip, of the whole picture."""
+"""Height of the strip, as a share of the whole picture."""
 
 _UNIT = 90.0
-"""Height of the strip that the measures below are meant for [pixel]: a picture of 1280 × 720."""
+"""Height of the strip for which the sizes below are defined [pixel]: a picture of 1280 × 720."""
 
 _BAR_BACK = "#46535f"
 _BAR = "#dfe5ea"
@@ -22,16 +22,16 @@ _BAR = "#dfe5ea"
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """What the strip tells of one instant."""
+    """The content of the strip at one instant."""
 
     gait: str
-    """Name of the gait in force."""
+    """Name of the present gait."""
     colour: str
     """The gait's."""
     k: float
     """Counter of the shift condition."""
     threshold: float
-    """What k is held against; 0 where no condition is at work."""
+    """Threshold of k; 0 without a condition."""
     speed: float
     """Forward [m/s]."""
     time: float
@@ -46,7 +46,7 @@ class Strip:
     def __init__(self, width: int, picture_height: int) -> None:
         self.width = width
         self.height = 2 * round(_SHARE * picture_height / 2)
-        """[pixel], even, as the video's code wants it."""
+        """[pixel], even, as the video codec requires."""
         self._scale = self.height / _UNIT
         self._large = _font("DejaVuSans-Bold.ttf", 34 * self._scale)
         self._plain = _font("DejaVuSans.ttf", 30 * self._scale)

@@ -22,10 +22,10 @@ _QUANTITIES: dict[str, Callable[[Frame], np.ndarray]] = {
     "gait": lambda frame: frame.step.gait,
     "machine_state": lambda frame: frame.step.machine_state,
 }
-"""What charts show, by name."""
+"""Quantities of the charts, by name."""
 
 WINDOW = 8.0
-"""Charts show this much of the past [s]."""
+"""Time window of the charts [s]."""
 
 
 class Tape:
@@ -36,7 +36,7 @@ class Tape:
         self._frames: deque[Frame] = deque()
 
     def add(self, frame: Frame) -> None:
-        """Takes in a frame; what is older than the window, or comes later, is let go."""
+        """Adds a frame; drops those before the window or later than this one."""
         while self._frames and self._frames[-1].time >= frame.time:
             self._frames.pop()  # the run began anew, or the slider was moved back
         self._frames.append(frame)
@@ -44,7 +44,7 @@ class Tape:
             self._frames.popleft()
 
     def clear(self) -> None:
-        """Lets all of it go."""
+        """Drops all frames."""
         self._frames.clear()
 
     @property
@@ -60,19 +60,19 @@ class Tape:
 
 
 _HEIGHT = 150
-"""Of a chart [pixels]."""
+"""Size of a chart [pixels]."""
 
 _WIDE, _ROW, _LEFT = 300, 16, 22
 """The contact diagram: width of the time axis, height of a leg's row, room for names [units]."""
 
 
 class Charts:
-    """What is drawn of one robot's tape, into the panel in which it is made."""
+    """The charts of one robot's tape, in the panel in which they are created."""
 
     def __init__(
         self, server: viser.ViserServer, machines: Mapping[str, RewardMachine | None]
     ) -> None:
-        """The machine of each gait by its name; where there is none, none is drawn."""
+        """The machine of each gait by its name; None: not drawn."""
         self._machines = tuple(machines.values())
         self._colours = tuple(gait_colours(machines).values())
         gui = cast(Any, server.gui)
@@ -85,7 +85,7 @@ class Charts:
         self._machine = gui.add_html("")
 
     def draw(self, tape: Tape) -> None:
-        """Shows the last seconds."""
+        """Draws the last seconds."""
         last = tape.last
         if last is None:
             return
@@ -104,7 +104,7 @@ class Charts:
         )
 
     def _show_condition(self, shown: bool) -> None:
-        """Whether the two charts of the condition are there: not where there is none."""
+        """Shows or hides the two charts of the condition."""
         for chart in (self._counter, self._heights):
             if chart.visible != shown:
                 chart.visible = shown
@@ -130,7 +130,7 @@ class Charts:
 
 
 def counter(tape: Tape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """k, β, and the shifts: as high as the larger of both where the gait changes, 0 elsewhere."""
+    """k, β, and the shifts: the larger of both where the gait changes, 0 elsewhere."""
     k, beta, gait = (tape.of(name) for name in ("k", "threshold", "gait"))
     shift = np.zeros(len(k))
     changed = np.flatnonzero(gait[1:] != gait[:-1])
@@ -139,12 +139,12 @@ def counter(tape: Tape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def foot_heights(tape: Tape) -> np.ndarray:
-    """Heights of the last touches (T, 4) [m]; NaN of a foot that has not touched yet."""
+    """Heights of the last touches (T, 4) [m]; NaN for a foot that has not touched yet."""
     return tape.of("touch_height")
 
 
 def contact_svg(tape: Tape, colours: tuple[str, ...]) -> str:
-    """When each foot was down over the window: a row a leg, coloured by gait."""
+    """When each foot was down over the window: one row per leg, coloured by gait."""
     high = _ROW * len(LEGS)
     parts = [
         f'<text x="0" y="{row * _ROW + 12}" font-size="11" fill="{QUIET}">{leg}</text>'
@@ -177,7 +177,7 @@ def contact_svg(tape: Tape, colours: tuple[str, ...]) -> str:
 
 
 def machine_svg(machine: RewardMachine, state: int, colour: str) -> str:
-    """The states of a machine in a ring, with the feet of each stance; the present one is lit."""
+    """The states of a machine in a ring, with the feet of each stance and the present one lit."""
     names = [" ".join(leg for leg in LEGS if leg in s.stance) or "no foot" for s in machine.states]
     number = {s.name: i for i, s in enumerate(machine.states)}
     count, wide, high, radius = len(names), 320, 130, 46

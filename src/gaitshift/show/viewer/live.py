@@ -1,4 +1,4 @@
-"""Robots that walk now, and take orders between two steps."""
+"""A live run of robots, which executes orders between two steps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -20,23 +20,23 @@ from gaitshift.sim.terrain import from_spec
 from gaitshift.sim.world import World
 
 MOST_ROBOTS = 16
-"""Robots that a page shows at most."""
+"""Largest number of robots on a page."""
 
 PUSH_TIME = 0.2
-"""How long a push lasts [s]."""
+"""Duration of a push [s]."""
 
 LYING = 2.0
-"""A robot that fell lies this long before all begin anew [s]."""
+"""Time from the first robot's fall until all restart [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LiveConfig:
-    """What walks, on what, and by which rule."""
+    """Settings of a live run: robots, ground, condition."""
 
     track: str = DemoConfig.track
     """Spec of the ground."""
     robots: int = 1
-    """The first is the one that charts tell of; the others are its ghosts."""
+    """Number of robots; charts show the first, and the others are drawn as its ghosts."""
     seed: int = 0
     """Seed of the ground and of the starts."""
     start: str = "trot"
@@ -46,7 +46,7 @@ class LiveConfig:
     condition: str = DEFAULT
     """When to shift, by the name of a shipped graph of two gaits."""
     numbers: Mapping[str, float] = field(default_factory=dict[str, float])
-    """Numbers of the condition that are others than in its file (`shift.there_and_back`)."""
+    """Numbers of the condition that differ from its file (`shift.there_and_back`)."""
     is_autonomous: bool = True
     """Whether robots shift by themselves."""
     speed: float | None = None
@@ -62,26 +62,26 @@ class LiveConfig:
 
     @property
     def graph(self) -> GaitGraph:
-        """What robots shift by."""
+        """The gait graph of the shifts, with these numbers."""
         shipped = between(load_graph(self.condition), flat=self.start, rough=self.rough_gait)
         return tuned(shipped, **self.numbers)
 
 
 class LiveRun:
-    """N robots on a track. Not for several threads at once."""
+    """N robots on a track. Not thread-safe."""
 
     def __init__(self, config: LiveConfig, policies: Mapping[str, Policy]) -> None:
-        """Any of the policies' gaits may be taken up later."""
+        """Any of the policies' gaits may be used later."""
         self._policies = dict(policies)
         self.config = config
         self._recorder: Recorder | None = None
         self.restart()
 
     def restart(self, config: LiveConfig | None = None) -> None:
-        """Begins anew, with another config if one is given; a recording ends.
+        """Restarts, with another config if one is given; a recording ends.
 
         Raises:
-            GaitshiftError: the config cannot be had; all stays as it was then.
+            GaitshiftError: the config is not possible; nothing changes then.
         """
         config = config or self.config
         ground = from_spec(
@@ -106,7 +106,7 @@ class LiveRun:
         self.ground = ground
 
     def change(self, config: LiveConfig) -> None:
-        """Goes on with another config, at once; anew where ground, robots or seed are others."""
+        """Continues with another config at once; restarts if ground, robots or seed differ."""
         before = self.config
         anew = ("track", "robots", "seed", "start", "rough_gait")
         if any(getattr(before, name) != getattr(config, name) for name in anew):
@@ -123,7 +123,7 @@ class LiveRun:
         self.config = config
 
     def take(self, gait: str) -> None:
-        """All robots take up a gait at once."""
+        """Changes the gait of all robots at once."""
         self._walk.controller.switch(np.arange(self.config.robots), gait, self._walk.world.sensed)
 
     def push(self, force: float, direction: float) -> None:
@@ -149,14 +149,14 @@ class LiveRun:
 
     @property
     def is_over(self) -> bool:
-        """Whether the first robot has come to the end, or has lain long enough."""
+        """Whether the first robot is at the end, or fell more than `LYING` seconds ago."""
         if self._fell_at is not None:
             return self._walk.time > self._fell_at + LYING
         return bool(self._walk.world.truth.base_position_w[0, 0] > self.finish_x)
 
     @property
     def robot(self) -> Robot:
-        """Which robot walks."""
+        """The robot description."""
         return self._walk.controller.robot
 
     @property
@@ -171,15 +171,15 @@ class LiveRun:
 
     @property
     def is_recording(self) -> bool:
-        """Whether steps are kept."""
+        """Whether steps are recorded."""
         return self._recorder is not None
 
     def record(self) -> None:
-        """Keeps the steps from now on."""
+        """Starts a recording."""
         self._recorder = Recorder(self._walk)
 
     def end_recording(self) -> Log | None:
-        """What was kept; None where nothing was."""
+        """Ends the recording and returns its log; None if it has fewer than 2 steps."""
         recorder, self._recorder = self._recorder, None
         return recorder.log() if recorder is not None and recorder.steps >= 2 else None
 
@@ -208,4 +208,4 @@ class LiveRun:
 
 
 DIRECTIONS = {"left": np.pi / 2, "right": -np.pi / 2, "forwards": 0.0, "backwards": np.pi}
-"""Of pushes, by name [rad]."""
+"""Directions of pushes, by name [rad]."""

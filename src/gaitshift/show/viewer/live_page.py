@@ -1,4 +1,4 @@
-"""The live page: robots walk, and whoever looks at it gives orders."""
+"""The live page: robots walk, and the user gives orders."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -17,14 +17,14 @@ from gaitshift.show.viewer.scene import Scene
 from gaitshift.show.viewer.server import TICK, Clock, Orders
 
 _CHARTS_EVERY = 6
-"""Pictures between two of the charts."""
+"""Frames between two updates of the charts."""
 
 _STEPS = round(TICK / CONTROL_PERIOD)
-"""Control steps from picture to picture at real time."""
+"""Control steps between two frames in real time."""
 
 
 class LivePage:
-    """Puts a `LiveRun` on a page. Orders are taken between two steps, by the thread that runs."""
+    """Shows a `LiveRun` on a page. The running thread executes orders between two steps."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class LivePage:
         live: LiveRun,
         save: Callable[[Log], str],
     ) -> None:
-        """`save` keeps a recording, and says in a line where it is."""
+        """`save` saves a recording, and returns a line that says where."""
         self._server, self._save = server, save
         self._live = live
         self._scene = Scene(server, live.robot, live.gaits)
@@ -44,7 +44,7 @@ class LivePage:
         self._factor = 1.0
         self._owed = 0.0
         self.pictures = 0
-        """Drawn so far."""
+        """Number of frames drawn so far."""
         self.walked = 0.0
         """Time that robots have walked so far, over all restarts [s]."""
         self._build()
@@ -65,7 +65,7 @@ class LivePage:
             clock.wait()
 
     def _advance(self) -> Frame | None:
-        """The steps that are due, and the last frame; None where nothing moved."""
+        """Runs the steps that are due; returns the last frame, None without a step."""
         self._owed = float(self._singles) if self._paused else self._owed + _STEPS * self._factor
         self._singles = 0
         frame: Frame | None = None

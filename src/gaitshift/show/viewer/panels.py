@@ -1,4 +1,4 @@
-"""Panels of the live page by which its robots are told what to do."""
+"""Panels of the live page that control its robots."""
 
 import math
 from collections.abc import Callable
@@ -10,14 +10,14 @@ from gaitshift.show.viewer.live import DIRECTIONS, MOST_ROBOTS, LiveConfig, Live
 from gaitshift.show.viewer.server import Orders
 
 _CONDITIONS = ("terrain", "height_difference", "paper")
-"""Shipped graphs of two gaits that the page offers."""
+"""Shipped graphs of two gaits on the page."""
 
 _GAITS_A_ROW = 4
-"""Buttons for gaits beside each other."""
+"""Number of gait buttons per row."""
 
 
 def build_gaits(gui: Any, orders: Orders, live: LiveRun) -> None:
-    """Which gait, whether robots shift by themselves, and the commands that they follow."""
+    """Controls for the gait, for autonomous shifts and for the commands."""
     alone = gui.add_checkbox(
         "shifts by itself",
         live.config.is_autonomous,
@@ -49,7 +49,7 @@ def build_gaits(gui: Any, orders: Orders, live: LiveRun) -> None:
 
 
 def build_condition(gui: Any, orders: Orders, live: LiveRun) -> None:
-    """Which condition, and its numbers."""
+    """Controls for the condition and its numbers."""
     shown = live.config.condition
     offered = tuple(dict.fromkeys((*_CONDITIONS, shown)))  # it may be a file
     name = gui.add_dropdown("condition", offered, initial_value=shown)
@@ -82,7 +82,7 @@ def build_condition(gui: Any, orders: Orders, live: LiveRun) -> None:
 
 
 def build_push(gui: Any, orders: Orders, live: LiveRun) -> None:
-    """How strong, which way, and a button that pushes."""
+    """Force, direction, and a button that pushes."""
     force = gui.add_slider("force [N]", min=0, max=300, step=10, initial_value=120)
     way = gui.add_dropdown("direction", tuple(DIRECTIONS), initial_value="left")
     orders.on_click(
@@ -94,7 +94,7 @@ def build_push(gui: Any, orders: Orders, live: LiveRun) -> None:
 def build_ground(
     gui: Any, orders: Orders, live: LiveRun, restart: Callable[[LiveConfig], None]
 ) -> Any:
-    """Track, seed and number of robots, with which `restart` begins anew: the seed's handle."""
+    """Controls for track, seed and number of robots; returns the seed's handle."""
     config = live.config
     track = gui.add_text("track", config.track)
     height = gui.add_slider(
@@ -127,7 +127,7 @@ def with_amplitude(track: str, amplitude: float) -> str:
 
 
 def amplitude_of(track: str) -> float:
-    """Of the first noise on a track, as far as the slider goes [m]."""
+    """Amplitude of the first noise on a track, within the slider's range [m]."""
     for piece in track.split(","):
         kind, _, number = piece.strip().partition(":")
         if kind == "perlin":

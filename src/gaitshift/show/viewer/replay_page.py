@@ -1,4 +1,4 @@
-"""The page of a log: what was recorded, with a slider over its time."""
+"""The page of a log: its frames, with a slider over its time."""
 
 import queue
 from collections.abc import Callable, Mapping
@@ -18,14 +18,14 @@ from gaitshift.show.viewer.scene import Scene
 from gaitshift.show.viewer.server import TICK, Clock
 
 _EVERY = round(TICK / CONTROL_PERIOD)
-"""Entries of a log from picture to picture."""
+"""Entries of a log between two frames."""
 
 
 class ReplayPage:
-    """Puts a log on a page."""
+    """Shows a log on a page."""
 
     def __init__(self, server: viser.ViserServer, log: Log, robot: Robot = ANYMAL_B) -> None:
-        """`robot` is what the log is of; `GaitshiftError` where it is of another one."""
+        """`robot` is the robot of the log; `GaitshiftError` if it is another one."""
         robot.check_is(log.robot, "the log")
         check_robot(log, 0)
         self._frames = frames_of(_few(log), _EVERY)
@@ -57,7 +57,7 @@ class ReplayPage:
             clock.wait()
 
     def _go_to(self, at: int) -> None:
-        """Makes frame `at` the present one, with the tape that leads there."""
+        """Makes frame `at` the present one, with the tape up to it."""
         if 0 <= at - self._at <= 10:
             for index in range(self._at, at + 1):
                 self._tape.add(self._frames[index])
@@ -106,11 +106,11 @@ class ReplayPage:
 
 
 def _machines(log: Log) -> Mapping[str, RewardMachine | None]:
-    """The machines of the log's gaits; None of one that is not shipped."""
+    """The machines of the log's gaits; None for a gait that is not shipped."""
     known = gaits.names()
     return {name: gaits.load(name) if name in known else None for name in log.gaits}
 
 
 def _few(log: Log) -> Log:
-    """The first robots of a log, as many as a page shows."""
+    """The first robots of a log, at most as many as a page shows."""
     return log if log.n <= MOST_ROBOTS else log.robots(slice(0, MOST_ROBOTS))

@@ -14,17 +14,17 @@ from gaitshift.show.plots.style import gait_colours
 from gaitshift.sim.terrain import Terrain
 
 _DARK = (70, 75, 82)
-"""A foot that does not touch."""
+"""Colour of a foot without contact."""
 
 _FOLLOW = 0.08
-"""Share of the way to the robot that the camera goes in each frame."""
+"""Share of the distance to the robot that the camera covers in each frame."""
 
 
 class Scene:
-    """What is drawn of one ground and N robots.
+    """The drawn shapes of one ground and N robots.
 
-    The ground hangs in the frame `/world`, which moves; robots are drawn where they are in the
-    picture, so that they stay in it where a slow browser is behind with one of the two.
+    The ground is in the frame `/world`, which moves. Robots are drawn relative to the picture, so
+    that they stay in it even if a slow browser updates one of the two late.
     """
 
     def __init__(self, server: viser.ViserServer, robot: Robot, gaits: tuple[str, ...]) -> None:
@@ -43,7 +43,7 @@ class Scene:
         self._touches: Any = None
         self._plane: Any = None
         self.follows = True
-        """Whether the world moves so that the first robot stays where it is in the picture."""
+        """Whether the world moves so that the first robot stays at its place in the picture."""
         self._centre = np.zeros(3)
 
     def set_ground(self, ground: Terrain) -> None:
@@ -51,7 +51,7 @@ class Scene:
         self._scene.add_mesh_trimesh("/world/ground", ground_mesh(ground), cast_shadow=False)
 
     def set_robots(self, n: int) -> None:
-        """Draws this many robots from now on."""
+        """Changes the number of drawn robots."""
         pose = {
             "batched_wxyzs": np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
             "batched_positions": np.zeros((n, 3)),
@@ -79,7 +79,7 @@ class Scene:
         )
 
     def draw(self, frame: Frame) -> None:
-        """Shows a frame."""
+        """Draws a frame."""
         if self.follows:
             base = frame.step.truth.base_position_w[0] * np.array([1.0, 1.0, 0.0])
             far = np.linalg.norm(base - self._centre) > 3.0

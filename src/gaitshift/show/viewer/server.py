@@ -1,4 +1,4 @@
-"""The page's server, its clock that keeps real time, and the orders that come in from the page."""
+"""The page's server, its real-time clock, and the queue of orders from the page."""
 
 import io
 import queue
@@ -13,20 +13,20 @@ import viser
 from gaitshift.errors import GaitshiftError
 
 TICK = 0.02
-"""Time between two pictures [s]."""
+"""Time between two frames [s]."""
 
 _LATE = 0.25
-"""A clock that is late by more lets the time go that it lost [s]."""
+"""A clock that is late by more than this skips the lost time [s]."""
 
 _CAMERA = (-1.6, -2.4, 1.3)
-"""Where one looks from at first, towards the origin [m]."""
+"""Initial position of the camera, which looks towards the origin [m]."""
 
 
 def serve(host: str, port: int) -> viser.ViserServer:
     """Opens the page.
 
     Raises:
-        GaitshiftError: the address or port cannot be had.
+        GaitshiftError: the address or port is not available.
     """
     if not 1 <= port <= 65535:
         raise GaitshiftError(f"port must be 1 to 65535, got {port}")
@@ -61,13 +61,13 @@ def close(server: viser.ViserServer) -> None:
 
 
 class Clock:
-    """Waits from picture to picture, at a multiple of real time."""
+    """Waits between frames, at a multiple of real time."""
 
     def __init__(self) -> None:
         self._due = time.perf_counter()
 
     def wait(self) -> None:
-        """Until the next picture is due."""
+        """Waits until the next frame is due."""
         self._due += TICK
         left = self._due - time.perf_counter()
         if left > 0:
@@ -77,7 +77,7 @@ class Clock:
 
 
 class Orders:
-    """Handles of the page give them from threads of the server's; the one that runs obeys."""
+    """Orders of the page: threads of the server add them, and the running thread executes them."""
 
     def __init__(self) -> None:
         self._waiting: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -109,7 +109,7 @@ class Orders:
         handle.on_update(enqueue)
 
     def obey(self, refuse: Callable[[GaitshiftError], None]) -> None:
-        """Carries out what has come in, and says what cannot be done."""
+        """Executes the waiting orders, and reports those that fail."""
         while True:
             try:
                 order = self._waiting.get_nowait()

@@ -1,4 +1,4 @@
-"""Whether a live page keeps real time, with someone at the other end who takes in all it sends."""
+"""Whether a live page runs in real time, with a client that receives all that it sends."""
 
 import multiprocessing as mp
 import os
@@ -21,27 +21,25 @@ from gaitshift.show.viewer.server import close, serve
 _HOST = "127.0.0.1"
 
 ROBOTS = (1, MOST_ROBOTS)
-"""Robots that a page's speed is told for: one, and as many as it shows."""
+"""Numbers of robots for which the speed is measured: one, and the most that a page shows."""
 
 _PATIENCE = 60.0
 """Longest time until the client has connected [s]."""
 
 
 def page_speed(robots: int, seconds: float, policies: Mapping[str, Policy]) -> dict[str, float]:
-    """A page of walking robots, on one core where the system can hold it there.
+    """Speed of a page of walking robots, on one core where the system can restrict it to one.
 
-    A client in another process, on any core, takes in what a browser would.
+    A client in another process, on any core, receives the data that a browser would receive.
 
     Args:
         robots: on the track.
         seconds: that the page runs [s]; 1 to 3600.
         policies: of the gaits.
 
-    Returns:
-        `real_time`: seconds walked in a second; 1 is what is asked for.
-        `pictures_per_s`: drawn in a second; 50 are asked for.
-        `core_share`: of one core's time, by all threads of the page's process.
-        `sent_mb_per_s`: what the client took in, in a second.
+    Returns: `real_time`: seconds walked per second; the target is 1. `pictures_per_s`: frames drawn
+    per second; the target is 50. `core_share`: share of one core's time, by all threads of the
+    page's process. `sent_mb_per_s`: data received by the client per second.
     """
     if not 1.0 <= seconds <= 3600.0:
         raise GaitshiftError(f"page_seconds must be 1 to 3600 s, got {seconds:g}")
@@ -72,7 +70,7 @@ def _served(port: int) -> Generator[viser.ViserServer]:
 
 @contextmanager
 def _on_one_core() -> Generator[None]:
-    """Holds this thread, and those that it starts, to one core; elsewhere than on Linux to none."""
+    """Restricts this thread, and those that it starts, to one core; on Linux only."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -86,7 +84,7 @@ def _on_one_core() -> Generator[None]:
 
 @contextmanager
 def _watched(address: str) -> Generator[Any]:
-    """A client at this address; gives the bytes that it has taken in so far."""
+    """A client at this address; yields the number of bytes that it has received so far."""
     context = mp.get_context("spawn")
     taken_in = context.Value("q", 0)
     client = context.Process(target=_take_in, args=(address, taken_in), daemon=True)
