@@ -18,12 +18,31 @@ needed = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machin
 _IS_OPAQUE = """() => [...document.querySelectorAll("canvas")].every(
     (canvas) => getComputedStyle(canvas).opacity === "1")"""
 
+_DRAWS_WHEN_ASKED = """
+    window.draws = false;
+    for (const of of ["Elements", "Arrays", "ElementsInstanced", "ArraysInstanced"]) {
+        const draw = WebGL2RenderingContext.prototype["draw" + of];
+        WebGL2RenderingContext.prototype["draw" + of] = function (...what) {
+            if (window.draws) draw.apply(this, what);
+        };
+    }
+    const next = window.requestAnimationFrame.bind(window);
+    window.requestAnimationFrame = (frame) =>
+        window.draws ? next(frame) : setTimeout(() => next(frame), 250);
+"""
+"""To draw in three dimensions by software takes most of a page's time, a second a picture. So a
+page leaves its picture empty, and renews it seldom, until `window.draws`."""
+
 _FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 def opened(browser, address, **context):
-    """A page on the address, and a list of what went wrong on it."""
+    """A page on the address, and a list of what went wrong on it.
+
+    It draws nothing in three dimensions until `wait_for_robot`.
+    """
     page = browser.new_context(viewport={"width": 1000, "height": 640}, **context).new_page()
+    page.add_init_script(_DRAWS_WHEN_ASKED)
     wrong = []
     page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
@@ -58,6 +77,7 @@ def wait_for_robot(page, name, columns=1.0, rows=1.0):
     The last screenshot is kept as out/screens/NAME.png.
     """
     page.wait_for_function(_IS_OPAQUE, polling=1000)
+    page.evaluate("() => { window.draws = true; }")
 
     def shown():
         points = keep(page, name)
