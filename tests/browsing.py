@@ -31,7 +31,7 @@ _DRAWS_WHEN_ASKED = """
         window.draws ? next(frame) : setTimeout(() => next(frame), 250);
 """
 """To draw in three dimensions by software takes most of a page's time, a second a picture. So a
-page leaves its picture empty, and renews it seldom, until `window.draws`."""
+page leaves its picture empty, and renews it seldom, while `window.draws` is false."""
 
 _FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
@@ -39,7 +39,7 @@ _FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshade
 def opened(browser, address, **context):
     """A page on the address, and a list of what went wrong on it.
 
-    It draws nothing in three dimensions until `wait_for_robot`.
+    It draws in three dimensions only while `wait_for_robot` looks at it.
     """
     page = browser.new_context(viewport={"width": 1000, "height": 640}, **context).new_page()
     page.add_init_script(_DRAWS_WHEN_ASKED)
@@ -85,6 +85,7 @@ def wait_for_robot(page, name, columns=1.0, rows=1.0):
         return shows_a_robot(points[: round(high * rows), : round(wide * columns)])
 
     wait_until(shown, pause=2.0)
+    page.evaluate("() => { window.draws = false; }")
 
 
 def launched(play):

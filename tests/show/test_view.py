@@ -110,7 +110,7 @@ def status(page):
 @pytest.mark.slow
 @browsing.needed
 def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
-    process, address = served("--track", "flat@60")
+    process, address = served("--track", "flat@200")
     page, wrong = opened(browser, address)
     first = status(page)
     assert first[0] == "trot"
@@ -178,7 +178,7 @@ def gait_is(page, gait):
 @browsing.needed
 def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(served, browser):
     """No feet differ by 0.3 m on this ground, and nearly all steps differ by 5 mm."""
-    _, address = served("--track", "perlin:0.1@40")
+    _, address = served("--track", "perlin:0.1@150")
     page, wrong = opened(browser, address, fine=True)
     enter(page, "α [m]", 0.3)
     enter(page, "α' [m]", 0.3)
@@ -199,7 +199,7 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
 @pytest.mark.slow
 @browsing.needed
 def test_the_clock_and_the_ground_are_in_the_hands_of_whoever_looks(served, browser):
-    _, address = served("--track", "flat@60")
+    _, address = served("--track", "flat@200")
     page, wrong = opened(browser, address, fine=True)
     wait_until(lambda: status(page)[2] > 3.0)
     pause(page)
@@ -227,7 +227,7 @@ def test_the_clock_and_the_ground_are_in_the_hands_of_whoever_looks(served, brow
 @browsing.needed
 def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_path):
     """What the sliders order stands in the recorded log, or is felt by the robot in it."""
-    _, address = served("--track", "perlin:0.1@40")
+    _, address = served("--track", "perlin:0.1@300")
     page, wrong = opened(browser, address)
     page.get_by_label("shifts by itself").uncheck()
     page.get_by_role("button", name="trot", exact=True).click()
@@ -281,7 +281,7 @@ def times_real_time(page):
 @pytest.mark.slow
 @browsing.needed
 def test_a_click_records_a_log_and_a_page(served, browser, tmp_path):
-    _, address = served("--track", "flat@60", "--robots", "2")
+    _, address = served("--track", "flat@200", "--robots", "2")
     page, wrong = opened(browser, address)
     begin_recording(page)
     log = end_recording(page, tmp_path / "recorded")
@@ -308,7 +308,7 @@ def settled(number):
 @pytest.mark.slow
 @browsing.needed
 def test_two_tabs_see_the_same_robot_and_a_machine_that_slept_does_not_hurry(served, browser):
-    process, address = served("--track", "flat@60")
+    process, address = served("--track", "flat@200")
     one, wrong_in_one = opened(browser, address)
     other, wrong_in_other = opened(browser, address)
     one.get_by_role("button", name="pace", exact=True).click()
