@@ -18,31 +18,26 @@ needed = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machin
 _IS_OPAQUE = """() => [...document.querySelectorAll("canvas")].every(
     (canvas) => getComputedStyle(canvas).opacity === "1")"""
 
-_DRAWS_WHEN_ASKED = """
-    window.draws = false;
-    for (const of of ["Elements", "Arrays", "ElementsInstanced", "ArraysInstanced"]) {
-        const draw = WebGL2RenderingContext.prototype["draw" + of];
-        WebGL2RenderingContext.prototype["draw" + of] = function (...what) {
-            if (window.draws) draw.apply(this, what);
-        };
-    }
+_DRAWS_NOTHING = """
+    for (const of of ["Elements", "Arrays", "ElementsInstanced", "ArraysInstanced"])
+        WebGL2RenderingContext.prototype["draw" + of] = () => {};
     const next = window.requestAnimationFrame.bind(window);
-    window.requestAnimationFrame = (frame) =>
-        window.draws ? next(frame) : setTimeout(() => next(frame), 250);
+    window.requestAnimationFrame = (frame) => setTimeout(() => next(frame), 250);
 """
-"""To draw in three dimensions by software takes most of a page's time, a second a picture. So a
-page leaves its picture empty, and renews it seldom, while `window.draws` is false."""
+"""Leaves a page's three-dimensional picture empty, and renews it seldom."""
 
 _FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-def opened(browser, address, **context):
+def opened(browser, address, *, draws=True, **context):
     """A page on the address, and a list of what went wrong on it.
 
-    It draws in three dimensions only while `wait_for_robot` looks at it.
+    To draw in three dimensions by software takes most of a page's time, a second a picture: a page
+    whose picture nobody looks at need not.
     """
     page = browser.new_context(viewport={"width": 1000, "height": 640}, **context).new_page()
-    page.add_init_script(_DRAWS_WHEN_ASKED)
+    if not draws:
+        page.add_init_script(_DRAWS_NOTHING)
     wrong = []
     page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     page.on("pageerror", lambda error: wrong.append(str(error)))
@@ -77,7 +72,6 @@ def wait_for_robot(page, name, columns=1.0, rows=1.0):
     The last screenshot is kept as out/screens/NAME.png.
     """
     page.wait_for_function(_IS_OPAQUE, polling=1000)
-    page.evaluate("() => { window.draws = true; }")
 
     def shown():
         points = keep(page, name)
@@ -85,7 +79,6 @@ def wait_for_robot(page, name, columns=1.0, rows=1.0):
         return shows_a_robot(points[: round(high * rows), : round(wide * columns)])
 
     wait_until(shown, pause=2.0)
-    page.evaluate("() => { window.draws = false; }")
 
 
 def launched(play):
