@@ -50,11 +50,11 @@ def arrays_in(state):
 @pytest.mark.parametrize("kind", STATISTICS)
 def test_robots_one_by_one_are_the_batch_bit_for_bit(kind):
     rng, statistic = np.random.default_rng(3), soon_known(kind)
-    batch, singles = statistic.start(3), [statistic.start(1) for _ in range(3)]
-    for sensed, rough in random_walk(rng, 3, 1500 if kind == "touchdown_surprise" else 500):
+    batch, singles = statistic.start(5), [statistic.start(1) for _ in range(5)]
+    for sensed, rough in random_walk(rng, 5, 1500 if kind == "touchdown_surprise" else 500):
         batch, values = watch(statistic, batch, sensed, rough)
-        assert values.shape == (3, statistic.width)
-        for robot in range(3):
+        assert values.shape == (5, statistic.width)
+        for robot in range(5):
             ids = np.array([robot])
             singles[robot], alone = watch(statistic, singles[robot], sensed.robots(ids), rough[ids])
             np.testing.assert_array_equal(alone[0], values[robot])

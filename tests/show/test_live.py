@@ -28,7 +28,9 @@ def test_a_page_walks_no_faster_than_time_and_draws_every_second_step(capsys):
     found = json.loads(capsys.readouterr().out)
     assert list(found) == ["robots_1", "robots_16"]
     for figures in found.values():
-        assert 0.0 < figures["real_time"] <= 1.02  # how near to 1 it gets is the machine's speed
+        assert figures["real_time"] <= 1.02
+        # Not 0.1 of a second walked in a second: neighbours may leave the page less of a core.
+        assert figures["real_time"] > 0.1 * figures["core_share"]
         assert figures["pictures_per_s"] == pytest.approx(50 * figures["real_time"])
         assert 0.0 < figures["core_share"] <= 1.05
     one, many = found.values()

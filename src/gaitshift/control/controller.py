@@ -125,8 +125,8 @@ CONTROLLERS = {
     "policy": "gaitshift.control.driver:Driver.load",
     "cpg": "gaitshift.control.cpg:CpgController",
 }
-"""Makers of controllers: trained policies, and oscillators that learned nothing. A new controller
-is a file, and its line here. A maker is imported when it is asked for."""
+"""Makers of controllers: trained policies, and oscillators without learning. A new controller is a
+file, and its line here. A maker is imported at its first use."""
 
 
 def controller_maker(name: str) -> ControllerMaker:

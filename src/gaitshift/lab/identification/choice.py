@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.firings import ParameterGrid, Tally
@@ -75,7 +75,7 @@ def _best(
         raise GaitshiftError(
             f"the recordings must contain {ground} ground to count false shifts on, got none"
         )
-    cost = _cost(tally)
+    cost = delay_with_misses(tally.came, tally.detected, tally.metres)
     free = _free(tally, grid, when)
     rate = tally.false_per_km
     allowed = free if free.any() else rate == np.nanmin(rate)
@@ -100,11 +100,20 @@ def _together(by_name: Mapping[str, Tally]) -> Tally:
     return whole
 
 
-def _cost(tally: Tally) -> Float[np.ndarray, "A B"]:
-    """Mean delay [m] over all robots that reached rough ground; a miss counts `MISS_COSTS`."""
-    missed = tally.came - tally.detected
-    total = tally.metres + MISS_COSTS * missed
-    return np.where(tally.came > 0, total / np.maximum(tally.came, 1), np.inf)
+def delay_with_misses(
+    came: Shaped[np.ndarray, "*of"],
+    detected: Shaped[np.ndarray, "*of"],
+    metres: Float[np.ndarray, "*of"],
+) -> Float[np.ndarray, "*of"]:
+    """Mean delay [m] of the robots that reached rough ground; a miss counts `MISS_COSTS`.
+
+    Args:
+        came: robots that reached rough ground; where there are none, the result is inf.
+        detected: those that shifted there.
+        metres: sum of their delays [m].
+    """
+    total = metres + MISS_COSTS * (came - detected)
+    return np.where(came > 0, total / np.maximum(came, 1), np.inf)
 
 
 def _free(tally: Tally, grid: ParameterGrid, when: Literal["above", "below"]) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from gaitshift import table
 from gaitshift.lab.identification import classifier
 from gaitshift.lab.identification.chatter import shipped_rule
-from gaitshift.lab.identification.choice import MISS_COSTS, Choice
+from gaitshift.lab.identification.choice import Choice, delay_with_misses
 from gaitshift.lab.identification.judging import Judged, OnCourse
 from gaitshift.lab.identification.labelled_run import Way
 from gaitshift.lab.identification.passage import LENGTH
@@ -105,7 +105,9 @@ def introduction(judged: Sequence[Judged], held_out: bool) -> tuple[str, str]:
 def _answer(rows: Sequence[Row], way: Way) -> str:
     """Detections and false shifts of the condition with the shortest mean delay, misses counted."""
     real = [row for row in rows if row["condition"] not in _BOUNDS] or rows
-    best = min(real, key=_cost)
+    came, detected = (np.array([row[name] for row in real]) for name in ("came", "detected"))
+    metres = detected * np.array([row["delay_m"] or 0.0 for row in real])
+    best = real[int(np.argmin(delay_with_misses(came, detected, metres)))]
     among = f"Of {len(real)} conditions " if len(real) > 1 else ""
     soonest = " soonest:" if among else ""
     end = "rough ground" if way == "rough" else "the end of rough ground"
@@ -116,13 +118,6 @@ def _answer(rows: Sequence[Row], way: Way) -> str:
         f"{among}`{best['condition']}` detects {end}{soonest} in {best['detected']} of "
         f"{best['came']} runs{delay}, with {false} in {best['km']:.2f} km."
     )
-
-
-def _cost(row: Row) -> float:
-    """Mean delay [m]; a run without a detection counts `MISS_COSTS`."""
-    came, detected = row["came"], row["detected"]
-    total = detected * (row["delay_m"] or 0.0) + MISS_COSTS * (came - detected)
-    return total / came if came else np.inf
 
 
 def _area_words(choice: Choice) -> str:

@@ -166,9 +166,11 @@ def render(
     k and its threshold, the forward speed and the time. `report` is called with the number of
     pictures done and the total.
 
-    Raises: VideoUnavailable: no OpenGL, or no ffmpeg, on this machine. GaitshiftError: no such
-    robot, a log of another kind of robot, an empty time span, a robot whose ground is not in the
-    log, an invalid size or rate, another file ending, or no such folder.
+    Raises:
+        VideoUnavailable: no OpenGL, or no ffmpeg, on this machine.
+        GaitshiftError: no such robot, a log of another kind of robot, an empty time span, a robot
+            whose ground is not in the log, an invalid size or rate, another file ending, or no
+            such folder.
     """
     _check_target(path, width, height, fps)
     _check_log(log, robot, description)

@@ -37,9 +37,11 @@ def page_speed(robots: int, seconds: float, policies: Mapping[str, Policy]) -> d
         seconds: that the page runs [s]; 1 to 3600.
         policies: of the gaits.
 
-    Returns: `real_time`: seconds walked per second; the target is 1. `pictures_per_s`: frames drawn
-    per second; the target is 50. `core_share`: share of one core's time, by all threads of the
-    page's process. `sent_mb_per_s`: data received by the client per second.
+    Returns:
+        `real_time`: seconds walked per second; the target is 1.
+        `pictures_per_s`: pictures drawn per second; the target is 50.
+        `core_share`: share of one core's time, by all threads of the page's process.
+        `sent_mb_per_s`: data received by the client per second.
     """
     if not 1.0 <= seconds <= 3600.0:
         raise GaitshiftError(f"page_seconds must be 1 to 3600 s, got {seconds:g}")
