@@ -56,6 +56,7 @@ def random_sensed(rng, n, step):
         joint_torque=rng.normal(scale=30.0, size=(n, 12)),
         velocity_b=rng.normal(size=(n, 3)),
         angular_velocity_b=rng.normal(size=(n, 3)),
+        mass=30.0,
         time=PERIOD * step,
         forward_speed_command=rng.random(n),
         stride_frequency_command=1.0 / (0.3 + rng.random(n)),

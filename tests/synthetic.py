@@ -74,6 +74,7 @@ def log_of(contact, *, gaits=("trot",), terrain=None, **changes):
         joint_torque=np.zeros((*shape, 12)),
         velocity_b=np.zeros((*shape, 3)),
         angular_velocity_b=np.zeros((*shape, 3)),
+        mass=ANYMAL_B.mass,
         time=np.arange(1, steps + 1) / 100,
         forward_speed_command=np.full(shape, 1.2),
         yaw_rate_command=np.zeros(shape),

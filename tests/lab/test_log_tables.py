@@ -73,11 +73,12 @@ def test_heading_joints_and_commands_are_read_from_columns_of_their_names(tmp_pa
     for index, joint in enumerate(joints):
         data[f"joint_torque_{joint}"] = np.full(ROWS, -2.0)
         data[f"joint_velocity_{joint}"] = np.full(ROWS, float(index))
-    data["yaw"] = 0.01 * np.arange(ROWS)
+    data["yaw"], data["mass"] = 0.01 * np.arange(ROWS), np.full(ROWS, 12.5)
     data["speed_command"], data["stride_frequency"] = np.full(ROWS, 0.8), np.full(ROWS, 2.5)
     (first, _) = passages(written(tmp_path, data))
     np.testing.assert_allclose(first.sensed.power, 2.0 * sum(range(12)))
     np.testing.assert_allclose(first.sensed.joint_velocity[3, 0], np.arange(12.0))
+    assert first.sensed.mass == 12.5
     assert first.sensed.has_heading
     np.testing.assert_allclose(first.sensed.yaw[:, 0], data["yaw"][:40], atol=1e-9)
     assert (first.sensed.forward_speed_command == 0.8).all()
@@ -217,6 +218,7 @@ def all_of(names, value):
         (gravity(0.0, 0.0, 0.0, until=2), "row 1, gravity_x, _y, _z must be a direction"),
         (gravity(0.3, 0.1, 9.7), "gravity_x, gravity_y, gravity_z must point gravity down"),
         (all_of(["roll"], 3.1), "roll, pitch must point gravity down"),
+        (all_of(["mass"], 12_500.0), "'mass' must be 0.1 to 1000 kg, got 1.25e+04"),
         (lambda data: data.update(time=10 * np.arange(ROWS)), "apart in 'time', got 10;"),
         (
             lambda data: data.update(time=1e-5 * np.arange(ROWS)),

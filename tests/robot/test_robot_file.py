@@ -94,6 +94,7 @@ def test_it_trains_is_told_apart_and_goes_on(tmp_path, capsys):
     main(["evaluate", str(path), *given, "--log", str(log), "--json"])
     assert json.loads(capsys.readouterr().out)["gait"] == "trot"
     assert Log.load(log).robot == "pony"
+    assert Log.load(log).sensed.mass == pytest.approx(12.5, abs=0.1)
     main(["report", str(log), "--robot-file", str(PONY)])
     assert "<td>pony</td>" in (tmp_path / "walk.html").read_text()
 

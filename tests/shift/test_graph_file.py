@@ -85,7 +85,6 @@ def test_a_graph_file_says_which_gaits_there_are_and_when_to_shift(tmp_path):
     [
         ("attitude_variance", "window", 0),
         ("slip", "window", -1.0),
-        ("cost_of_transport", "mass", 0.0),
         ("cost_of_transport", "least_speed", 0.0),
         ("value_drop", "fast", 0.0),
         ("value_drop", "slow", "inf"),

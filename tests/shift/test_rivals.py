@@ -67,13 +67,14 @@ def test_timing_is_by_how_much_a_stride_was_off_and_a_foot_overdue_shows_it_at_o
 
 
 def test_cost_of_transport_is_power_over_weight_and_speed():
-    statistic = CostOfTransport(mass=20.0)
+    statistic = CostOfTransport()
     state = statistic.start(1)
     for _ in range(120):
         walking = standing(  # 12 joints at 12.5 W, half of them against their motion
             joint_torque=np.array([[12.5, -12.5] * 6]),
             joint_velocity=np.ones((1, 12)),
             velocity_b=np.array([[1.5, 0.0, 0.0]]),
+            mass=20.0,
         )
         state, value = statistic.step(state, walking)
     assert value[0, 0] == pytest.approx(150.0 / (20.0 * 9.81 * 1.5))

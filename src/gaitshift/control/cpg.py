@@ -111,8 +111,6 @@ class CpgConfig:
     """Time in which a swinging foot moves to that offset [s]."""
     levelling: float = 0.3
     """Share of roll and pitch that standing legs correct."""
-    mass: float = ANYMAL_B.mass
-    """Mass of the robot [kg]; standing legs get the torques that support it."""
     loading: float = 0.15
     """Share of a stance over which the load of a leg grows, and over which it falls at the end."""
     smoothing: float = 0.1
@@ -216,7 +214,7 @@ class CpgController:
         part = phase / duty
         share = np.clip(np.minimum(part, 1.0 - part) / loading, 0.0, 1.0)
         total = np.maximum(share.sum(axis=1, keepdims=True), 1.0)
-        return self.config.mass * GRAVITY * share / total
+        return self.robot.mass * GRAVITY * share / total
 
     def _feet(
         self, phase: Float[np.ndarray, "N 4"], sensed: Proprioception, command: Command

@@ -120,8 +120,10 @@ class Log(Batch):
         for name in ("robot", "terrain"):
             values[name] = str(values[name])
         values["gaits"] = tuple(str(name) for name in np.atleast_1d(values["gaits"]))
-        plain = {"sensed.has_heading": bool, "sensed.period": float}
+        plain = {"sensed.has_heading": bool, "sensed.period": float, "sensed.mass": float}
         for name, kind in plain.items():
+            if name not in values:
+                continue
             if np.size(values[name]) != 1:
                 raise GaitshiftError(
                     f"{path}: '{name}' must be one value, got the shape {np.shape(values[name])}"

@@ -18,6 +18,9 @@ LEAST_PERIOD, MOST_PERIOD = 0.0005, 0.5
 """Least and greatest time between two entries [s]; ours: no robot is controlled faster, and slower
 entries miss steps, so a value outside is not a time in seconds."""
 
+LEAST_MASS, MOST_MASS = 0.1, 1000.0
+"""Least and greatest mass of a robot [kg]; ours: no quadruped is lighter or heavier."""
+
 RATE_TOLERANCE = 0.05
 """Largest deviation of the time between two entries from that of the first two [period]."""
 
@@ -100,11 +103,20 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
                 f"{path}: quaternions of '{name}' must have length 1, got {length[wrong][0]:.3g}"
                 f"{_where(wrong, name)}"
             )
+    check_mass(path, values.get("sensed.mass", 1.0))
     gait, names = values["gait"], values["gaits"]
     if gait.min() < 0 or gait.max() >= len(names):
         raise GaitshiftError(
             f"{path}: 'gait' must be 0 to {len(names) - 1}, an index into 'gaits', got "
             f"{gait.min()} to {gait.max()}"
+        )
+
+
+def check_mass(path: Path, mass: float) -> None:
+    """Raises `GaitshiftError` unless it is the mass of a robot [kg]."""
+    if not LEAST_MASS <= mass <= MOST_MASS:
+        raise GaitshiftError(
+            f"{path}: 'mass' must be {LEAST_MASS:g} to {MOST_MASS:g} kg, got {mass:.4g}"
         )
 
 

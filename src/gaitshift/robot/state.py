@@ -93,7 +93,7 @@ class Batch:
 class Moving(Batch):
     """A record with the velocity of a base, `velocity_b`."""
 
-    def need(self, name: str, by: str) -> np.ndarray:
+    def need(self, name: str, by: str) -> Any:
         """The optional field `name`.
 
         Raises:
@@ -152,6 +152,8 @@ class Proprioception(Moving):
     """Time since the start [s]."""
     period: float = CONTROL_PERIOD
     """Time of a step [s]."""
+    mass: float | None = None
+    """Of the robot, by its description [kg]."""
     forward_speed_command: Float[np.ndarray, "*batch"] | None = None
     """Commanded velocity along body x [m/s]."""
     yaw_rate_command: Float[np.ndarray, "*batch"] | None = None

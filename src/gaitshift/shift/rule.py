@@ -122,4 +122,5 @@ class Modulation:
         at, factors = zip(*self.points, strict=True)
         if self.of == "time":
             return np.full(len(sensed.contact), float(np.interp(sensed.time, at, factors)))
-        return np.interp(sensed.need("forward_speed_command", "α over speed"), at, factors)
+        command: np.ndarray = sensed.need("forward_speed_command", "α over speed")
+        return np.interp(command, at, factors)

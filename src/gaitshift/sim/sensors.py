@@ -19,6 +19,7 @@ def sense(
     torque: Float[np.ndarray, "N 12"],
     *,
     contact: Bool[np.ndarray, "N 4"],
+    mass: float,
 ) -> Proprioception:
     """Proprioception without noise and without delay.
 
@@ -29,6 +30,7 @@ def sense(
         qvel: MuJoCo's velocities: m/s in the world, rad/s in the body, rad/s of the joints.
         torque: of the joints [N·m].
         contact: which feet bear on the ground.
+        mass: of the robot [kg].
     """
     offset = truth.foot_position_w - truth.base_position_w[:, None]
     return Proprioception(
@@ -40,4 +42,5 @@ def sense(
         joint_torque=torque.copy(),
         velocity_b=truth.velocity_b,
         angular_velocity_b=qvel[:, 3:TWIST].copy(),
+        mass=mass,
     )

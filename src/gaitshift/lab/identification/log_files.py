@@ -11,7 +11,7 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way, rough_ground
 from gaitshift.lab.log import Log
-from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE
+from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE, check_mass
 from gaitshift.robot.legs import JOINTS, LEGS
 from gaitshift.robot.state import Proprioception, orientation_of
 from gaitshift.shift import LegOdometry
@@ -34,7 +34,7 @@ SCALARS = {
     "stride_frequency_command": "stride_frequency",
     "value": "value",
 }
-"""Optional signals of one column each [m/s], [Hz]; `yaw` [rad] is optional too."""
+"""Optional signals of one column each [m/s], [Hz]; `yaw` [rad] and `mass` [kg] are optional too."""
 
 _JOINTS = ("joint_position", "joint_velocity", "joint_torque")
 """Optional signals of twelve columns: `joint_torque_FL_HAA` and so on [rad], [rad/s], [N·m]."""
@@ -50,6 +50,7 @@ _NUMBERS = (
     *FEET,
     *(name for names in ATTITUDES for name in names),
     "yaw",
+    "mass",
     *SCALARS.values(),
     *(f"{prefix}_{axis}" for prefix in VECTORS.values() for axis in _AXES),
     *(f"{prefix}_{leg}_{joint}" for prefix in _JOINTS for leg in LEGS for joint in JOINTS),
@@ -238,6 +239,9 @@ def _recording(path: Path, columns: dict[str, np.ndarray], rows: slice) -> Label
         if all(name in cut for name in names):
             values = np.stack([cut[name] for name in names], axis=1)
             optional[signal] = values if signal in SCALARS else values[:, None]
+    if "mass" in cut:
+        optional["mass"] = float(cut["mass"][0])
+        check_mass(path, optional["mass"])
     steps, time = len(cut["time"]), cut["time"]
     sensed = Proprioception(
         contact=np.stack([cut[name] > 0.5 for name in CONTACTS], axis=1)[:, None],

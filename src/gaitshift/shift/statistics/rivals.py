@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.state import GRAVITY, Proprioception
 from gaitshift.shift.statistic import SIX_LEAKS, SearchRange, check_positive
 
@@ -55,18 +54,16 @@ class CostOfTransport:
 
     window: float = 1.0
     """Power and speed are means that forget by e in this time [s]."""
-    mass: float = ANYMAL_B.mass
-    """[kg]; of another robot its `Robot.mass`."""
     least_speed: float = 0.1
     """A slower robot counts as this fast [m/s]."""
 
     unit = ""
     width = 1
-    needs = ("joint_torque", "joint_velocity", "velocity_b")
+    needs = ("joint_torque", "joint_velocity", "velocity_b", "mass")
     search = SearchRange(low=0.1, high=10.0, note="mechanical power over weight and speed")
 
     def __post_init__(self) -> None:
-        check_positive(self, "window", "mass", "least_speed")
+        check_positive(self, "window", "least_speed")
 
     def start(self, n: int) -> Float[np.ndarray, "N 3"]:
         """Sum of weights, mean power [W] and mean forward speed [m/s], nothing seen yet."""
@@ -76,13 +73,14 @@ class CostOfTransport:
         self, state: Float[np.ndarray, "N 3"], sensed: Proprioception
     ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
         """Means after this step, and the cost."""
+        mass = sensed.need("mass", "cost_of_transport")
         power = sensed.power
         speed = sensed.forward_speed
         now = np.stack([np.ones(len(power)), power, speed], axis=1)
         after = state + sensed.period / self.window * (now - state)
         weight, mean_power, mean_speed = after.T
         mean_speed = np.maximum(mean_speed / weight, self.least_speed)
-        cost = mean_power / weight / (self.mass * GRAVITY * mean_speed)
+        cost = mean_power / weight / (mass * GRAVITY * mean_speed)
         return after, np.where(weight < 1.0 - np.exp(-1.0), np.nan, cost)[:, None]
 
 

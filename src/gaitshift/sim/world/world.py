@@ -200,7 +200,13 @@ class World:
             body_contact=sensors[:, 28] > 0.0,
         )
         self.sensed = sense(
-            self.truth, rotation, qpos, qvel, self._torque, contact=force > CONTACT_FORCE
+            self.truth,
+            rotation,
+            qpos,
+            qvel,
+            self._torque,
+            contact=force > CONTACT_FORCE,
+            mass=self.robot.mass,
         )
 
     def _feet(self, sensors: Float[np.ndarray, "K S"]) -> Float[np.ndarray, "K 4 3"]:
