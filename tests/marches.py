@@ -15,14 +15,14 @@ FEET = np.array(
 )
 
 
-def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
+def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3, period=PERIOD):
     """Robots that trot at 1 m/s; from 4 s on the ground under each touch is off by ± noise [m].
 
     On smooth ground by ± 1 mm, so that no two touches are level.
     """
     rng = np.random.default_rng(seed)
-    steps = round(seconds / PERIOD)
-    time = PERIOD * np.arange(1, steps + 1)
+    steps = round(seconds / period)
+    time = period * np.arange(1, steps + 1)
     rough = np.broadcast_to((time > smooth)[:, None], (steps, robots))
     if noise == 0.0:
         rough = np.zeros_like(rough)
@@ -45,7 +45,7 @@ def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
         orientation=turned(np.zeros((steps, robots))),
         has_heading=False,
         time=time,
-        period=PERIOD,
+        period=period,
     )
     return LabelledRun(
         name=name,
@@ -54,6 +54,11 @@ def march(name, *, noise, seconds=12.0, smooth=4.0, seed=0, robots=3):
         alive=np.ones((steps, robots), dtype=bool),
         distance=np.tile(time[:, None], (1, robots)),
     )
+
+
+def walk(seed=0):
+    """One robot that comes from smooth onto rough ground, in a log at 50 Hz."""
+    return march("into", noise=0.04, robots=1, seed=seed, period=0.02)
 
 
 def table(path, recording):

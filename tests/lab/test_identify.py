@@ -17,7 +17,7 @@ from gaitshift.lab.identification.passage import passage_scores
 from gaitshift.lab.identification.statistics import auc_interval
 from gaitshift.lab.identification.tuning import as_given, try_grids, tune
 from gaitshift.shift import Rule
-from marches import march, table
+from marches import march, table, walk
 
 
 def backwards(run):
@@ -162,10 +162,7 @@ def test_the_interval_of_an_area_is_wide_where_trials_are_few():
 
 
 def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
-    logs = [
-        str(table(tmp_path / f"walk{seed}.csv", march("into", noise=0.04, robots=1, seed=seed)))
-        for seed in range(2)
-    ]
+    logs = [str(table(tmp_path / f"walk{seed}.csv", walk(seed))) for seed in range(2)]
     out = tmp_path / "report"
     command = ["identify", *logs, "--condition", "all", "--out", str(out), "--json"]
     main(command)
@@ -188,7 +185,7 @@ def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
 
 
 def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
-    log = str(table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1)))
+    log = str(table(tmp_path / "walk.csv", walk()))
     command = ["identify", log, "--condition", "paper", "--alpha", "0.2", "--beta", "1000"]
     main([*command, "--out", str(tmp_path / "report"), "--json"])
     (row,) = json.loads(capsys.readouterr().out)["conditions"]
@@ -219,7 +216,7 @@ def test_identify_judges_numbers_that_are_given(tmp_path, capsys):
 )
 def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, arguments, message):
     logs = {
-        "log": table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1)),
+        "log": table(tmp_path / "walk.csv", walk()),
         "smooth": table(tmp_path / "flat.csv", march("flat", noise=0.0, robots=1)),
     }
     given = [argument.format(**logs) for argument in arguments]
@@ -237,8 +234,16 @@ def test_bad_input_of_identify_is_one_line_and_code_2(tmp_path, capsys, argument
 
 @pytest.fixture
 def two_logs(tmp_path):
-    walks = [march("into", noise=0.04, robots=1), march("into", noise=0.04, robots=1, seed=5)]
-    return [table(tmp_path / f"walk-{i}.csv", walk) for i, walk in enumerate(walks)]
+    return [table(tmp_path / f"walk-{i}.csv", walk(seed)) for i, seed in enumerate((0, 5))]
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The report of `two_logs` by a run that nothing stopped."""
+    folder = tmp_path_factory.mktemp("whole")
+    logs = [table(folder / f"walk-{i}.csv", walk(seed)) for i, seed in enumerate((0, 5))]
+    identify(logs, folder / "out")
+    return report_in(folder / "out")
 
 
 def replayed_logs(monkeypatch, killed_at=None):
@@ -256,8 +261,8 @@ def replayed_logs(monkeypatch, killed_at=None):
     return seen
 
 
-def identify(logs, out, *more):
-    main(["identify", *map(str, logs), "--out", str(out), "--condition", "paper", "oracle", *more])
+def identify(logs, out, conditions=("paper", "oracle")):
+    main(["identify", *map(str, logs), "--out", str(out), "--condition", *conditions])
 
 
 def report_in(folder):
@@ -266,10 +271,9 @@ def report_in(folder):
 
 @pytest.mark.parametrize("killed_at", [1, 2, 3])
 def test_a_run_that_was_killed_goes_on_where_it_stopped(
-    tmp_path, monkeypatch, capsys, two_logs, killed_at
+    tmp_path, monkeypatch, capsys, two_logs, whole, killed_at
 ):
-    whole, out = tmp_path / "whole", tmp_path / "out"
-    identify(two_logs, whole)
+    out = tmp_path / "out"
     done = replayed_logs(monkeypatch, killed_at)
     with pytest.raises(SystemExit) as end:
         identify(two_logs, out)
@@ -279,7 +283,7 @@ def test_a_run_that_was_killed_goes_on_where_it_stopped(
     identify(two_logs, out)
     assert [*done, *after] == ["walk-0", "walk-1", "walk-0", "walk-1"], "chosen by, then judged by"
     assert "choosing: walk-0 (cached)" in capsys.readouterr().err
-    assert report_in(out) == report_in(whole)
+    assert report_in(out) == whole
     assert not (out / "unfinished").exists()
 
 
@@ -314,10 +318,10 @@ def test_the_classifier_goes_on_too(tmp_path, monkeypatch, two_logs):
     for folder, killed_at in ((whole, None), (out, 5), (out, None)):
         seen = replayed_logs(monkeypatch, killed_at)
         if killed_at is None:
-            identify(two_logs, folder, "classifier")
+            identify(two_logs, folder, ["classifier"])
         else:
             with pytest.raises(SystemExit):
-                identify(two_logs, folder, "classifier")
+                identify(two_logs, folder, ["classifier"])
     assert seen == ["walk-1"], "the last log to be judged by"
     assert report_in(out) == report_in(whole)
 
@@ -392,7 +396,7 @@ def test_a_classifier_needs_both_labels(rough, says):
 def test_of_all_conditions_the_classifier_is_left_out_where_one_robot_is_all_there_is(
     tmp_path, capsys
 ):
-    log = table(tmp_path / "walk.csv", march("into", noise=0.04, robots=1))
+    log = table(tmp_path / "walk.csv", walk())
     out = ["--out", str(tmp_path / "report"), "--json"]
     main(["identify", str(log), "--condition", "all", *out])
     said = capsys.readouterr()

@@ -257,11 +257,12 @@ def mean_area(tuned, recordings, beta):
 
 
 def test_passages_are_scored_at_the_beta_that_tells_them_apart_best():
-    (tuned,) = tuned_by(height_candidates()[:1], uneven(), way="rough")
-    areas = np.array([mean_area(tuned, uneven(), beta) for beta in BETAS])
+    recordings = uneven()
+    (tuned,) = tuned_by(height_candidates()[:1], recordings, way="rough")
+    areas = np.array([mean_area(tuned, recordings, beta) for beta in BETAS])
     assert areas.max() > areas[np.searchsorted(BETAS, tuned.choice.beta)] + 0.01
     assert tuned.area_beta == BETAS[areas.argmax()]
-    (judged,) = judged_by([tuned], uneven())
+    (judged,) = judged_by([tuned], recordings)
     told = [area[0] for c in "ab" if (area := judged.area(c)) is not None]
     assert np.mean(told) == pytest.approx(areas.max())
     (row,) = condition_rows([judged])
@@ -301,7 +302,7 @@ def test_shifts_there_and_back_are_those_of_a_live_graph(statistic_back):
     for t, sensed in enumerate(rec):
         state, decision = graph.step(state, sensed)
         expected += decision.fired & rec.alive[t]
-    np.testing.assert_array_equal(shifts(rec, graph), expected)
+    np.testing.assert_array_equal(shifts(rec, [graph]), [expected])
     assert expected.min() > 2, "they chatter"
 
 

@@ -77,17 +77,18 @@ class Batch:
 
     def _map(self, change: Callable[[int, np.ndarray], Any], *, also_time: bool = False) -> Self:
         """The record with `change(trailing axes, array)` in place of each of its arrays."""
-        values = dict[str, Any]()
+        changed = object.__new__(type(self))  # `replace` takes ten times as long
         for name, trailing in trailing_axes(type(self)).items():
             value: Any = getattr(self, name)
-            if isinstance(value, Batch):
-                values[name] = value._map(change, also_time=also_time)
-            elif isinstance(value, np.ndarray) and trailing is not None:
-                values[name] = change(trailing, cast(Any, value))
-            elif isinstance(value, np.ndarray) and name == "time" and also_time:
+            if trailing is not None and value is not None:
+                value = change(trailing, value)
+            elif isinstance(value, Batch):
+                value = value._map(change, also_time=also_time)
+            elif also_time and name == "time" and isinstance(value, np.ndarray):
                 time = change(0, cast(Any, value))
-                values[name] = time if time.ndim else float(time)
-        return replace(cast(Any, self), **values)
+                value = time if time.ndim else float(time)
+            changed.__dict__[name] = value
+        return changed
 
 
 class Moving(Batch):

@@ -1,6 +1,6 @@
 """The conditions that are compared: a statistic each, with α and leaks to try."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -55,6 +55,13 @@ class Candidate:
         """Columns that it reads and the recording's log lacks."""
         absent = (name for name in self.needs if getattr(recording.sensed, name) is None)
         return tuple(column for name in absent for column in columns_of(name))
+
+
+def watched_by(candidates: Iterable[Candidate], recording: LabelledRun) -> Iterator[Watched]:
+    """The statistics of the candidates whose signals a recording has."""
+    for candidate in candidates:
+        if candidate.statistic is not None and not candidate.missing(recording):
+            yield candidate.statistic
 
 
 def _watching(name: str, statistic: Watched, **changes: Any) -> Candidate | None:

@@ -1,5 +1,6 @@
 """Chatter: how often robots would shift to the rough gait and back, by two rules."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,17 +64,19 @@ def in_turn(rule: Rule, statistic: Watched, way: Way) -> GaitGraph:
     )
 
 
-def shifts(recording: LabelledRun, graph: GaitGraph) -> Int[np.ndarray, " N"]:
-    """Number of shifts of each robot, there and back together.
+def shifts(recording: LabelledRun, graphs: Sequence[GaitGraph]) -> Int[np.ndarray, "G N"]:
+    """Number of shifts of each robot by each of the graphs, there and back together.
 
     All begin in the gait for flat ground. A robot that has fallen no longer shifts.
     """
     n = recording.robots
-    state, count = graph.begin(n), np.zeros(n, dtype=np.int64)
+    states = [graph.begin(n) for graph in graphs]
+    count = np.zeros((len(graphs), n), dtype=np.int64)
     for alive, sensed, rough in zip(recording.alive, recording, recording.rough, strict=True):
-        before = replace(state, gait=count % 2)
-        state, decision = graph.step(before, sensed, rough)
-        count += decision.fired & alive
+        for i, graph in enumerate(graphs):
+            before = replace(states[i], gait=count[i] % 2)
+            states[i], decision = graph.step(before, sensed, rough)
+            count[i] += decision.fired & alive
     return count
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.lab.identification.candidates import watched_by
 from gaitshift.lab.identification.chatter import (
     RecordedValues,
     chattered,
@@ -25,6 +26,7 @@ from gaitshift.lab.identification.labelled_run import LabelledRun, align_to_entr
 from gaitshift.lab.identification.passage import longest_passage, passage_scores
 from gaitshift.lab.identification.statistics import auc, auc_interval
 from gaitshift.lab.identification.tuning import Tuned
+from gaitshift.shift import GaitGraph
 
 
 @dataclass(kw_only=True)
@@ -130,6 +132,8 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[LabelledRun]) -> R
         steps = steps_alive(recording.alive)
         replayed.metres += float(recording.distance[steps - 1, np.arange(recording.robots)].sum())
         replayed.seconds += float(steps.sum()) * recording.period
+        recording.watch(watched_by((one.candidate for one in tuned), recording))
+        graphs: dict[str, GaitGraph] = {}
         for one in tuned:
             name, rule = one.candidate.name, one.rule
             if missing := one.candidate.missing(recording):
@@ -145,14 +149,17 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[LabelledRun]) -> R
             _add(course, one, seen, aligned)
             if one.way == "flat" or ever_fires(recording, rule, values):
                 watched = one.candidate.statistic or RecordedValues(values=values)
-                count = shifts(recording, in_turn(rule, watched, one.way))
-                course.shifts += int(count.sum())
-                course.chattered += int(chattered(recording, count).sum())
+                graphs[name] = in_turn(rule, watched, one.way)
             width, period = values.shape[2], recording.period
             replayed.soonest[name] = rule.soonest(width, period)
             least = one.area_rule.soonest(width, period)
             enough = least < period * (longest_passage(seen) + 0.5)
             replayed.scored[name] = replayed.scored.get(name, False) or enough
+        counts = shifts(recording, list(graphs.values())) if graphs else ()
+        for name, count in zip(graphs, counts, strict=True):
+            course = replayed.courses[name][recording.name]
+            course.shifts += int(count.sum())
+            course.chattered += int(chattered(recording, count).sum())
     return replayed
 
 

@@ -1,7 +1,7 @@
 """The input of identification: what robots sense over a run, and where the ground is rough."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -31,6 +31,8 @@ class LabelledRun:
     """Whether the robot is on its feet; steps after a fall do not count."""
     distance: Float[np.ndarray, "T N"]
     """Distance that each robot has walked since the start [m]."""
+    _watched: dict[Watched, Float[np.ndarray, "T N M"]] = field(default_factory=dict, init=False)
+    """Values of statistics that were computed before."""
 
     @property
     def time(self) -> Float[np.ndarray, " T"]:
@@ -52,13 +54,20 @@ class LabelledRun:
         """Proprioception step by step, as on the robots."""
         return (self.sensed[t] for t in range(len(self.rough)))
 
+    def watch(self, statistics: Iterable[Watched]) -> None:
+        """Computes several statistics in one pass; `values` then returns them."""
+        new = [one for one in dict.fromkeys(statistics) if one not in self._watched]
+        memory = [one.start(self.robots) for one in new]
+        values = [np.empty((*self.rough.shape, one.width)) for one in new]
+        for t, sensed in enumerate(self if new else ()):
+            for i, one in enumerate(new):
+                memory[i], values[i][t] = watch(one, memory[i], sensed, self.rough[t])
+        self._watched.update(zip(new, values, strict=True))
+
     def values(self, statistic: Watched) -> Float[np.ndarray, "T N M"]:
         """A statistic's values, computed step by step with the code that runs on a robot."""
-        memory = statistic.start(self.robots)
-        values = np.empty((len(self.rough), self.robots, statistic.width))
-        for t, sensed in enumerate(self):
-            memory, values[t] = watch(statistic, memory, sensed, self.rough[t])
-        return values
+        self.watch((statistic,))
+        return self._watched[statistic]
 
     @classmethod
     def from_log(cls, log: Log, name: str, rough: Bool[np.ndarray, "T N"]) -> "LabelledRun":
