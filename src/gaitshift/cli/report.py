@@ -64,7 +64,7 @@ class Report(RobotOption):
         print(path)
 
     def _tell_training(self, path: Path, robot: Robot) -> None:
-        from gaitshift.show.report import write_training_report
+        from gaitshift.show.report import TrainingFigures, write_training_report
 
         final = self.source / "policy.onnx"
         if not final.is_file():
@@ -72,11 +72,12 @@ class Report(RobotOption):
                 f"{self.source} must be a log or the folder of a training that finished or was "
                 "stopped by Ctrl-C, got a folder without policy.onnx"
             )
+        figures = TrainingFigures.read(self.source)
         policy = policies.load(final, robot)
         walks = [*_checkpoints(self.source), ("at the end", _walk(policy))]
         iterations = policy.info.training["iterations"]
         write_training_report(
-            self.source,
+            figures,
             path,
             walks[::-1],
             robot,

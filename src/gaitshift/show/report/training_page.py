@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,33 @@ from gaitshift.show.report.page import Row, facts_table, table, write_page
 from gaitshift.table import read
 
 
+@dataclass(frozen=True, kw_only=True)
+class TrainingFigures:
+    """What the files of a run say, ready for its page."""
+
+    course: dict[str, Any]
+    """Data of the learning curves."""
+    verdicts: str
+    """Table of the verdicts; empty without any."""
+    settings: dict[str, str]
+    """Command, seed and recipe."""
+
+    @classmethod
+    def read(cls, folder: Path) -> "TrainingFigures":
+        """Reads `progress.csv`, `config.json` and, where it is, `verdicts.csv` of a run.
+
+        Raises:
+            GaitshiftError: one of the files cannot be read.
+        """
+        return cls(
+            course=_course(folder / "progress.csv"),
+            verdicts=_verdicts(folder / "verdicts.csv"),
+            settings=_facts(folder / "config.json"),
+        )
+
+
 def write_training_report(
-    folder: Path,
+    figures: TrainingFigures,
     path: Path,
     walks: Sequence[tuple[str, Log]],
     robot: Robot,
@@ -27,15 +53,12 @@ def write_training_report(
     """Writes the page of a training: its walks to choose from, its course, its verdicts.
 
     Args:
-        folder: the run; its `progress.csv` and, where there are any, `verdicts.csv` are shown.
+        figures: of the run.
         path: the HTML file.
         walks: what policies of the run do, by name; the first robot of each log is shown.
         robot: what walks in them.
         title: what was trained.
         summary: a sentence on it.
-
-    Raises:
-        GaitshiftError: a file of the run that cannot be read.
     """
     for _, log in walks:
         robot.check_is(log.robot, "the log")
@@ -44,11 +67,11 @@ def write_training_report(
         title=title,
         summary=summary,
         walks=[(name, run_data(log, 0, robot)) for name, log in walks],
-        course=_course(folder / "progress.csv"),
+        course=figures.course,
         sections=[
             ("Walks at checkpoints", table(("policy", *STRETCH_HEAD), _walks(walks, robot))),
-            ("Verdicts at checkpoints, on flat ground", _verdicts(folder / "verdicts.csv")),
-            ("Settings", facts_table(_facts(folder / "config.json"))),
+            ("Verdicts at checkpoints, on flat ground", figures.verdicts),
+            ("Settings", facts_table(figures.settings)),
         ],
     )
 
