@@ -25,7 +25,9 @@ It knows `Self` where it decorates whole classes alone, so that here anything ma
 FIRST, EVERY = 5, 101
 """ours: of each function's calls in a test, the first 5 are checked and then one in 101.
 
-A check costs up to a millisecond: 50 and one in 20 makes a demonstration 2.7 times as slow.
+A check costs up to a millisecond: 50 and one in 20 makes a demonstration 2.7 times as slow. Of a
+nested function only the first calls are checked: it is made anew by every call of the function
+around it, and its check would be compiled anew as well.
 """
 
 _calls = {}
@@ -39,8 +41,6 @@ def install():
         check = whole(typechecker=typechecker)
 
         def decorated(thing):
-            if inspect.isfunction(thing) and "<locals>" in thing.__qualname__:
-                return thing  # made anew at every call: to check it is to compile its check anew
             if inspect.isfunction(thing):
                 return _sampled(thing, check)
             if is_dataclass(thing) and not hasattr(thing.__init__, "__wrapped__"):
@@ -59,14 +59,15 @@ def begin_test():
 
 
 def _sampled(plain, check):
-    key = id(plain.__code__)
+    key = id(plain.__code__)  # the same for all that a nested `def` makes
+    is_nested = "<locals>" in plain.__qualname__
     checked = None
 
     @functools.wraps(plain)
     def call(*args, **kwargs):
         nonlocal checked
         count = _calls[key] = _calls.get(key, 0) + 1
-        if count > FIRST and count % EVERY:
+        if count > FIRST and (is_nested or count % EVERY):
             return plain(*args, **kwargs)
         checked = checked or check(_of_any_class(plain))
         return checked(*args, **kwargs)

@@ -16,7 +16,7 @@ from gaitshift.lab.identification.judging import judge, replay_rules
 from gaitshift.lab.identification.passage import passage_scores
 from gaitshift.lab.identification.statistics import auc_interval
 from gaitshift.lab.identification.tuning import as_given, try_grids, tune
-from gaitshift.shift import Rule
+from gaitshift.shift import HeightDifference, PlaneResidual, Rule, TouchdownSurprise
 from marches import march, table, walk
 
 
@@ -72,6 +72,15 @@ def test_numbers_that_are_chosen_notice_noise_and_keep_still_on_smooth_ground():
         time = sum(len(way.time) * way.period * way.robots for way in ways())
         assert judged.speed == pytest.approx(way / time)
     assert 0.002 < tuned[0].choice.alpha < 0.08
+
+
+def test_values_computed_in_one_pass_are_those_of_each_statistic_alone():
+    statistics = HeightDifference(), TouchdownSurprise(), PlaneResidual()
+    together = march("into", noise=0.04)
+    together.compute(statistics)
+    for statistic in statistics:
+        alone = march("into", noise=0.04).values(statistic)
+        np.testing.assert_array_equal(together.values(statistic), alone)
 
 
 def test_judging_replays_what_a_live_condition_does():

@@ -302,7 +302,8 @@ def test_shifts_there_and_back_are_those_of_a_live_graph(statistic_back):
     for t, sensed in enumerate(rec):
         state, decision = graph.step(state, sensed)
         expected += decision.fired & rec.alive[t]
-    np.testing.assert_array_equal(shifts(rec, [graph]), [expected])
+    never = there_and_back(HeightDifference(), Rule(alpha=9.0, beta=9.0), Rule(alpha=9.0, beta=9.0))
+    np.testing.assert_array_equal(shifts(rec, [graph, never]), [expected, np.zeros(3)])
     assert expected.min() > 2, "they chatter"
 
 

@@ -57,7 +57,7 @@ class Candidate:
         return tuple(column for name in absent for column in columns_of(name))
 
 
-def watched_by(candidates: Iterable[Candidate], recording: LabelledRun) -> Iterator[Watched]:
+def statistics_of(candidates: Iterable[Candidate], recording: LabelledRun) -> Iterator[Watched]:
     """The statistics of the candidates whose signals a recording has."""
     for candidate in candidates:
         if candidate.statistic is not None and not candidate.missing(recording):

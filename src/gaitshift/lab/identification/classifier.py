@@ -137,7 +137,7 @@ def _features(
 ) -> Float[np.ndarray, "S N F"]:
     """Inputs of the classifier at every fifth step; NaN where nothing is known yet."""
     columns: list[np.ndarray] = []
-    recording.watch(statistics)
+    recording.compute(statistics)
     for statistic in statistics:
         values = recording.values(statistic)
         known = ~np.isnan(values)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.candidates import watched_by
+from gaitshift.lab.identification.candidates import statistics_of
 from gaitshift.lab.identification.chatter import (
     RecordedValues,
     chattered,
@@ -132,7 +132,7 @@ def replay_rules(tuned: Sequence[Tuned], recordings: Iterable[LabelledRun]) -> R
         steps = steps_alive(recording.alive)
         replayed.metres += float(recording.distance[steps - 1, np.arange(recording.robots)].sum())
         replayed.seconds += float(steps.sum()) * recording.period
-        recording.watch(watched_by((one.candidate for one in tuned), recording))
+        recording.compute(statistics_of((one.candidate for one in tuned), recording))
         graphs: dict[str, GaitGraph] = {}
         for one in tuned:
             name, rule = one.candidate.name, one.rule

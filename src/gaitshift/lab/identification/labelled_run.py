@@ -31,8 +31,8 @@ class LabelledRun:
     """Whether the robot is on its feet; steps after a fall do not count."""
     distance: Float[np.ndarray, "T N"]
     """Distance that each robot has walked since the start [m]."""
-    _watched: dict[Watched, Float[np.ndarray, "T N M"]] = field(default_factory=dict, init=False)
-    """Values of statistics that were computed before."""
+    _values: dict[Watched, Float[np.ndarray, "T N M"]] = field(default_factory=dict, init=False)
+    """Values of the statistics that were computed before."""
 
     @property
     def time(self) -> Float[np.ndarray, " T"]:
@@ -54,20 +54,20 @@ class LabelledRun:
         """Proprioception step by step, as on the robots."""
         return (self.sensed[t] for t in range(len(self.rough)))
 
-    def watch(self, statistics: Iterable[Watched]) -> None:
-        """Computes several statistics in one pass; `values` then returns them."""
-        new = [one for one in dict.fromkeys(statistics) if one not in self._watched]
+    def compute(self, statistics: Iterable[Watched]) -> None:
+        """Computes several statistics in one pass over the steps; `values` then returns them."""
+        new = [one for one in dict.fromkeys(statistics) if one not in self._values]
         memory = [one.start(self.robots) for one in new]
         values = [np.empty((*self.rough.shape, one.width)) for one in new]
         for t, sensed in enumerate(self if new else ()):
             for i, one in enumerate(new):
                 memory[i], values[i][t] = watch(one, memory[i], sensed, self.rough[t])
-        self._watched.update(zip(new, values, strict=True))
+        self._values.update(zip(new, values, strict=True))
 
     def values(self, statistic: Watched) -> Float[np.ndarray, "T N M"]:
         """A statistic's values, computed step by step with the code that runs on a robot."""
-        self.watch((statistic,))
-        return self._watched[statistic]
+        self.compute((statistic,))
+        return self._values[statistic]
 
     @classmethod
     def from_log(cls, log: Log, name: str, rough: Bool[np.ndarray, "T N"]) -> "LabelledRun":

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.identification.candidates import BETAS, Candidate, watched_by
+from gaitshift.lab.identification.candidates import BETAS, Candidate, statistics_of
 from gaitshift.lab.identification.choice import Choice, choose
 from gaitshift.lab.identification.firings import ParameterGrid, Tally, first_firings, join_by_name
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way, align_to_entry
@@ -89,7 +89,7 @@ def try_grids(
     """Replays each candidate whose signals a recording has, at each of its α, β and leaks."""
     tried = Tried(way=way)
     for recording in recordings:
-        recording.watch(watched_by(candidates, recording))
+        recording.compute(statistics_of(candidates, recording))
         for candidate in candidates:
             if missing := candidate.missing(recording):
                 tried.lacking[candidate.name] = missing

@@ -137,7 +137,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def set_terrain(
         self, terrain: Terrain | Sequence[Terrain], fidelity: Fidelity = "exact"
     ) -> None:
-        """Replaces the ground under the robots, which keep their motion.
+        """Replaces the ground under the robots, which keep their motion, and its fidelity.
 
         Robots are divided among several grounds as in `World`; all cover the same rectangle.
         """

@@ -117,7 +117,10 @@ class World:
     def set_terrain(
         self, terrain: Terrain | Sequence[Terrain], fidelity: Fidelity = "exact"
     ) -> None:
-        """Replaces the ground; robots keep their motion and are moved vertically onto it."""
+        """Replaces the ground and the fidelity of its contacts.
+
+        Robots keep their motion and are moved vertically onto the new ground.
+        """
         terrains = (terrain,) if isinstance(terrain, Terrain) else tuple(terrain)
         if not terrains:
             raise GaitshiftError("there must be at least one terrain, got none")
