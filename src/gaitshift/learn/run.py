@@ -28,15 +28,22 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.sim.world import Divergence
 from gaitshift.table import Row
 
 CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
-PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
+PROGRESS, VERDICTS, DIVERGED = "progress.csv", "verdicts.csv", "diverged"
 
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
 Judge = Callable[[Path], Row]
 """Evaluates a policy file and returns its verdict, a row of `verdicts.csv`."""
+
+Keep = Callable[[Divergence, Path], None]
+"""Writes the last second of a robot whose simulation diverged to a file."""
+
+MOST_FILES = 8
+"""Most files of divergences in a run's folder; ours: enough to see a cause."""
 
 
 class Run:
@@ -138,12 +145,16 @@ class Run:
         return run
 
     def train(
-        self, report: Callable[[Row], None] = lambda row: None, judge: Judge | None = None
+        self,
+        report: Callable[[Row], None] = lambda row: None,
+        judge: Judge | None = None,
+        keep: Keep | None = None,
     ) -> Path:
         """Runs to the end, calling `report` after each iteration; gives the policy's path.
 
         At each checkpoint the policy is written for `judge`, and its verdict is saved. If a kill
-        prevented the verdict of the present checkpoint, that one is made first.
+        prevented the verdict of the present checkpoint, that one is made first. With `keep`, the
+        first `MOST_FILES` divergences are written to `diverged/ITERATION-ROBOT.npz`.
         After Ctrl-C the last checkpoint and the present policy are on disk.
         """
         writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
@@ -156,6 +167,7 @@ class Run:
                 row = self.iterate()
                 self._log(row, writer)
                 report(row)
+                self._keep_divergences(keep)
                 if self._is_checkpoint():
                     self._save_checkpoint()
                     if judge is not None:
@@ -270,6 +282,15 @@ class Run:
         for name, value in row.items():
             if name not in ("iteration", "stage"):
                 writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
+
+    def _keep_divergences(self, keep: Keep | None) -> None:
+        seen = self.learner.env.world.divergences
+        folder = self.folder / DIVERGED
+        for divergence in seen:
+            if keep is not None and len(list(folder.glob("*.npz"))) < MOST_FILES:
+                folder.mkdir(exist_ok=True)
+                keep(divergence, folder / f"{self.iteration:06d}-{divergence.robot}.npz")
+        seen.clear()
 
     def _lacks_verdict(self) -> bool:
         if self.iteration == 0 or not self._is_checkpoint():

@@ -4,6 +4,7 @@ Another quadruped is another `Robot` value: its MJCF needs a free joint, twelve 
 joints in the order legs × (HAA, HFE, KFE), and per leg the sensors this module names.
 """
 
+import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -97,6 +98,9 @@ class Robot:
         """
         import mujoco
 
+        if mujoco.get_mju_user_warning() is None:
+            # By default MuJoCo writes a file MUJOCO_LOG.TXT into the working directory.
+            mujoco.set_mju_user_warning(logging.getLogger("mujoco").info)
         spec = mujoco.MjSpec.from_file(str(self.model_file))
         for actuator in cast("list[mujoco.MjsActuator]", spec.actuators):
             actuator.gainprm[0] = gains.kp
