@@ -17,6 +17,10 @@ from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Robot
 
+MOST_BYTES = 64 << 20
+"""Size of the largest policy file that is read [bytes]; ours: a hundred times that of a shipped
+one."""
+
 _SHIPPED = Path(__file__).parent / "policies"
 
 _ONLY_WHAT_IS_ASKED: Any = cast(Any, onnxruntime).RunOptions()
@@ -108,6 +112,11 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
             )
     if not path.is_file():
         raise GaitshiftError(f"no policy file {path}")
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise GaitshiftError(
+            f"{path}: a policy file must have {MOST_BYTES >> 20} MB or less, got {size >> 20} MB"
+        )
     session = _open(path)
     info = read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
     try:
@@ -165,3 +174,22 @@ def _check(policy: Policy) -> None:
     wanted = inputs["observation"][1]
     if expected != info.observation or wanted != policy.observation.size:
         raise GaitshiftError(f"the observation slices must match the network's {wanted} inputs")
+    _try(policy)
+
+
+def _try(policy: Policy) -> None:
+    """`GaitshiftError` for a network that does not run on several robots, or gives no numbers."""
+    outputs = {"action": (2, 12)} | ({"value": (2, 1)} if policy.has_critic else {})
+    nothing = np.zeros((2, policy.observation.size), dtype=np.float32)
+    for name, shape in outputs.items():
+        try:
+            given = policy(nothing) if name == "action" else policy.value(nothing)[:, None]
+        except Exception as error:  # as in `_open`
+            raise GaitshiftError(
+                f"the network cannot give '{name}' for two robots; export it again from its run"
+            ) from error
+        if given.shape != shape or not np.isfinite(given).all():
+            raise GaitshiftError(
+                f"the network must give finite numbers as '{name}', of the shape {shape} for two "
+                f"robots, got the shape {given.shape}; export it again from its run"
+            )

@@ -17,6 +17,7 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from gaitshift import table
+from gaitshift.data import json_in, located
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
@@ -123,22 +124,23 @@ class Run:
     @classmethod
     def resume(cls, folder: Path) -> "Run":
         """The run of a folder, as it was at its last checkpoint."""
+        if not (folder / CONFIG).is_file():
+            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}")
+        with located(f"{folder / CONFIG} is damaged"):
+            config: Any = json_in(folder / CONFIG)
         try:
-            config = json.loads((folder / CONFIG).read_text())
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
             robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
             run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
-        except (FileNotFoundError, NotADirectoryError) as error:
-            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
         except cattrs.BaseValidationError as error:
             faults = "; ".join(cattrs.transform_error(error))
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {faults}") from error
         except GaitshiftError as error:
             raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
-        checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
+        checkpoints = run._checkpoints()
         if not checkpoints:
             raise GaitshiftError(f"{folder / CHECKPOINTS} has no checkpoint to resume from")
         run._load_checkpoint(checkpoints[-1])
@@ -204,7 +206,7 @@ class Run:
         layers = deepcopy(self.learner.ppo.actor.mlp)
         total = {name: weights.clone() for name, weights in layers.state_dict().items()}
         count = 1
-        for path in sorted((self.folder / CHECKPOINTS).glob("*.pt")):
+        for path in self._checkpoints():
             earlier = int(path.stem)
             if earlier < self.iteration and self.recipe.is_averaged(earlier):
                 state = _read_checkpoint(path)["ppo"]["actor_state_dict"]
@@ -249,6 +251,11 @@ class Run:
     def _is_checkpoint(self) -> bool:
         last = self.iteration == self.recipe.iterations
         return last or self.iteration % self.recipe.checkpoint_every == 0
+
+    def _checkpoints(self) -> list[Path]:
+        """The files of the run's checkpoints, in their order."""
+        found = (self.folder / CHECKPOINTS).glob("*.pt")
+        return sorted(path for path in found if path.stem.isdecimal())
 
     def _save_checkpoint(self) -> None:
         path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
@@ -303,9 +310,17 @@ class Run:
         table.append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
 
 
+_CHECKPOINT = {"iteration": int, "wall_s": float, "torch_rng": torch.Tensor, "ppo": dict}
+"""What a checkpoint holds."""
+
+
 def _read_checkpoint(path: Path) -> dict[str, Any]:
     try:
-        return torch.load(path, weights_only=True)
+        state = torch.load(path, weights_only=True)
+        for name, kind in _CHECKPOINT.items():
+            if not isinstance(state[name], kind):
+                raise TypeError(f"'{name}' is a {type(state[name]).__name__}")
+        return state
     except Exception as error:  # torch has no common class for a damaged file
         raise GaitshiftError(
             f"{path} is damaged; remove it to resume from the checkpoint before it"
