@@ -132,7 +132,12 @@ def _open(path: Path) -> onnxruntime.InferenceSession:
     options.intra_op_num_threads = 1  # the networks are small, and the physics uses the cores
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(
+            path,
+            options,
+            providers=["CPUExecutionProvider"],
+            enable_fallback=0,  # it prints, and tries the same again
+        )
     except Exception as error:  # onnxruntime has a class for each fault, without a common base
         raise GaitshiftError(
             f"{path} is a truncated or damaged ONNX file; export it again from its run"

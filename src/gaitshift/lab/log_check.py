@@ -17,8 +17,8 @@ MOST_POSITION, MOST_REACH = 100_000.0, 100.0
 that of `World`, and no leg is as long as the second."""
 
 MOST_NUMBER, MOST_COUNT = 1e9, 1e30
-"""Greatest of other numbers, in SI units, and of those without unit, counters and values of critics;
-ours: pages and pictures keep them in single precision."""
+"""Greatest of other numbers, in SI units, and of those without a unit: counters, values of critics;
+ours: single precision holds them."""
 
 MOST_GAITS = 64
 """Most gaits of a log; ours: eight times those of the package."""
@@ -170,7 +170,7 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
 
 def limit_of(name: str) -> float:
     """Greatest number of an array of a log file, or of a column of a table."""
-    if name in _MAY_BE_NAN or f"sensed.{name}" in _MAY_BE_NAN:
+    if {name, f"sensed.{name}"} & {*_MAY_BE_NAN, "sensed.time"}:  # the period says more on times
         return MOST_COUNT
     if name == "sensed.foot_position_b" or name.startswith("foot_"):
         return MOST_REACH

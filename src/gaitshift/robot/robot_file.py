@@ -1,5 +1,6 @@
 """A user's robot: its numbers from a TOML file, checked together with its model."""
 
+import warnings
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
@@ -89,7 +90,13 @@ def _checked_model(robot: Robot) -> mujoco.MjModel:
         raise GaitshiftError("no such file")
     check_mjcf(robot.model_file)
     try:
-        model = cast(mujoco.MjModel, robot.spec(robot.gains_of("default")).compile())
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)
+            model = cast(mujoco.MjModel, robot.spec(robot.gains_of("default")).compile())
+    except UserWarning as warning:
+        raise GaitshiftError(
+            f"MuJoCo warns of the model: {' '.join(str(warning).split())}"
+        ) from None
     except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         raise GaitshiftError(
             f"MuJoCo cannot read the model: {' '.join(str(error).split())}"
