@@ -17,6 +17,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from markdown_it import MarkdownIt
 from onnx import TensorProto, helper
 
 from gaitshift import table
@@ -31,8 +32,10 @@ from gaitshift.learn import run as runs
 from gaitshift.robot.description import Gains
 from gaitshift.robot.robot_file import read_robot
 from gaitshift.shift import load_graph
+from gaitshift.show.plots import demo_figure
 from gaitshift.show.report import write_report
 from gaitshift.show.report.page import write_page
+from gaitshift.show.viewer.server import as_markdown
 from synthetic import log_of
 from trot_tables import TROT, edited
 
@@ -421,6 +424,16 @@ def test_a_network_that_cannot_run_is_refused_when_it_is_loaded(tmp_path, fault,
     assert message in refusal(policy.load, network(tmp_path / "a.onnx", fault))
 
 
+@pytest.mark.parametrize("word", [b"gaitshift.robot", b"anymal_b", b"observation"])
+def test_a_policy_file_with_a_text_that_is_not_utf_8_is_refused(tmp_path, word):
+    content = policy.load("trot").path.read_bytes()
+    assert word in content
+    changed = content.replace(word, b"\xa3" + word[1:])
+    assert "a.onnx is a truncated or damaged ONNX file" in refusal(
+        policy.load, written(tmp_path / "a.onnx", changed)
+    )
+
+
 STATES = {
     "a list": [1, 2],
     "no iteration": {"wall_s": 0.0, "torch_rng": torch.get_rng_state(), "ppo": {}},
@@ -499,6 +512,20 @@ def test_places_in_what_is_put_into_a_page_are_text(tmp_path):
     words = Page((tmp_path / "a.html").read_text()).words
     for name in ("@DATA@", "@SCRIPT@ @SUMMARY@", "@TITLE@"):
         assert name in words
+
+
+@pytest.mark.parametrize("name", ["$\\frac$", "$", "a_{b}^"])
+def test_a_name_in_a_log_is_drawn_as_text(tmp_path, name):
+    log = log_of(np.ones((40, 1, 4), dtype=bool), gaits=(name,))
+    demo_figure(log, tmp_path / "a.svg")
+    assert (tmp_path / "a.svg").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("name", [*NAMES, "{1+1}", "**a**", "# a", "[a](b)"])
+def test_a_name_in_the_viewers_markdown_is_text(name):
+    (paragraph,) = [t for t in MarkdownIt("commonmark").parse(as_markdown(name)) if t.children]
+    assert [(child.type, child.content) for child in paragraph.children] == [("text", name)]
+    assert "{" not in as_markdown(name), "MDX takes it for code"
 
 
 REFUSED_BY_MERMAID = (

@@ -10,6 +10,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import EvaluationConfig, divergence_log, evaluate
 from gaitshift.robot.description import ANYMAL_B
+from gaitshift.show.report import write_report
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.world import World
 from worlds import LEVEL, ROUGH, arrays_of, assert_same_bits, robots, run, wild_targets
@@ -153,6 +154,8 @@ def test_a_divergence_is_replayed_as_the_states_that_were_kept(tmp_path):
     np.testing.assert_allclose(read.qpos[:, 0], lost.qpos, rtol=0, atol=1e-6)
     assert read.gaits == ("trot",)
     np.testing.assert_array_equal(read.terrain_height, ROUGH.height)
+    write_report(read, tmp_path / "index.html")
+    assert (tmp_path / "index.html").stat().st_size > 100_000
 
 
 def test_robots_that_diverge_count_as_fallen_in_an_evaluation(monkeypatch):

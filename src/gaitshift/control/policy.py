@@ -117,8 +117,8 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
         raise GaitshiftError(
             f"{path}: a policy file must have {MOST_BYTES >> 20} MB or less, got {size >> 20} MB"
         )
-    session = _open(path)
-    info = read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
+    session, metadata = _open(path)
+    info = read_info(path, metadata)
     try:
         policy = Policy(path, info, RewardMachine.from_dict(info.machine), session, robot)
         _check(policy)
@@ -127,17 +127,20 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
     return policy
 
 
-def _open(path: Path) -> onnxruntime.InferenceSession:
+def _open(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
+    """The network of a file, and its metadata; all its texts are UTF-8."""
     options = cast(Any, onnxruntime).SessionOptions()
     options.intra_op_num_threads = 1  # the networks are small, and the physics uses the cores
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(
+        session: Any = onnxruntime.InferenceSession(
             path,
             options,
             providers=["CPUExecutionProvider"],
             enable_fallback=0,  # it prints, and tries the same again
         )
+        _ = [end.name for end in (*session.get_inputs(), *session.get_outputs())]
+        return session, session.get_modelmeta().custom_metadata_map
     except Exception as error:  # onnxruntime has a class for each fault, without a common base
         raise GaitshiftError(
             f"{path} is a truncated or damaged ONNX file; export it again from its run"

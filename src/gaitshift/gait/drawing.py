@@ -55,7 +55,7 @@ def draw(machine: RewardMachine, path: Path) -> None:
     bottom = min(y for _, y in middles.values()) - 2.4
     top = max(y for _, y in middles.values()) + 3.6
     with cast(Any, matplotlib).rc_context(
-        {"svg.hashsalt": "gaitshift", "font.family": "DejaVu Sans"}
+        {"svg.hashsalt": "gaitshift", "font.family": "DejaVu Sans", "text.parse_math": False}
     ):
         size = (2 * half_width * _INCHES, (top - bottom) * _INCHES)
         figure = Figure(figsize=size, facecolor=_PAPER)

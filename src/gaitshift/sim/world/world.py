@@ -226,10 +226,9 @@ class World:
         self._history.add(self._qpos, self._qvel)
         self._ctrl[:] = target
         self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
-        in_range = np.abs(self._qvel).max(axis=1) <= FASTEST  # false for NaN
-        diverged = self._warned.any(axis=1) | ~in_range
-        if diverged.any():
-            self._restart(np.flatnonzero(diverged))
+        if self._warned.any() or not np.abs(self._qvel).max() <= FASTEST:  # true for NaN
+            in_range = np.abs(self._qvel).max(axis=1) <= FASTEST
+            self._restart(np.flatnonzero(self._warned.any(axis=1) | ~in_range))
         else:
             self._measure()
         return self.sensed, self.truth
