@@ -66,10 +66,13 @@ class Learner:
     def _collect_and_update(self) -> dict[str, float]:
         self.ppo.train_mode()
         statistics = _Statistics()
+        # A second thread of torch waits for work by spinning, and so would hold up the physics.
+        torch.set_num_threads(1)
         with torch.inference_mode():
             for _ in range(self.recipe.steps):
                 self._collect(statistics)
             self.ppo.compute_returns(self._observation)
+        torch.set_num_threads(self.recipe.threads)
         losses = self.ppo.update()
         return {
             **statistics.means(),

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.env import Curriculum, EnvConfig
+from gaitshift.sim.world import Fidelity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +63,8 @@ class Stage:
     """Shown in the progress and written into `progress.csv`."""
     iterations: int
     """PPO iterations."""
+    fidelity: Fidelity = "exact"
+    """Of the physics; a gait may be discovered in coarse physics and finished in exact physics."""
     amplitude: float = 0.0
     """Largest |height| of the Perlin grounds at the end of the stage [m]."""
     slope: float = 0.0

@@ -222,7 +222,7 @@ class Run:
         stage, within = self.recipe.stage_at(self.iteration)
         env = self.learner.env
         if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
-            env.set_terrain(draw_grounds(stage, within, self.seed))
+            env.set_terrain(draw_grounds(stage, within, self.seed), stage.fidelity)
             env.push_at_most(stage.push)
         env.curriculum = self.recipe.curriculum(self.iteration)
         settling = self.recipe.settling(self.iteration)
@@ -281,7 +281,7 @@ class Run:
         torch.set_rng_state(state["torch_rng"])
         stage, within = self.recipe.stage_at(self.iteration)
         drawn = within - within % stage.redraw_every
-        self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed))
+        self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed), stage.fidelity)
         self.learner.env.push_at_most(stage.push)
 
     def _log(self, row: Row, writer: SummaryWriter) -> None:

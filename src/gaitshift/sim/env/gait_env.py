@@ -20,7 +20,7 @@ from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.episodes import Commander, MixedStart, mix
 from gaitshift.sim.reward import Swings, earned_bonus, walk_reward, with_bonus
 from gaitshift.sim.terrain import Terrain
-from gaitshift.sim.world import Pusher, World
+from gaitshift.sim.world import Fidelity, Pusher, World
 
 Observations = Float32[np.ndarray, "N D"]
 
@@ -137,12 +137,14 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         observation = self._next_observation(terminated | truncated, info)
         return observation, reward, terminated, truncated, info
 
-    def set_terrain(self, terrain: Terrain | Sequence[Terrain]) -> None:
+    def set_terrain(
+        self, terrain: Terrain | Sequence[Terrain], fidelity: Fidelity = "exact"
+    ) -> None:
         """Replaces the ground under the robots, which keep their motion.
 
         Robots are divided among several grounds as in `World`; all cover the same rectangle.
         """
-        self.world.set_terrain(terrain)
+        self.world.set_terrain(terrain, fidelity)
 
     def push_at_most(self, force: float) -> None:
         """Sets the largest push on a base [N] from now on; 0 ends the pushes."""
