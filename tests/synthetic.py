@@ -89,6 +89,7 @@ def log_of(contact, *, gaits=("trot",), terrain=None, **changes):
         foot_force=np.zeros((*shape, 4)),
         clearance=np.zeros((*shape, 4)),
         body_contact=np.zeros(shape, dtype=bool),
+        diverged=np.zeros(shape, dtype=bool),
     )
     log = Log(
         sensed=sensed,

@@ -1,7 +1,13 @@
-"""Reads TOML files table by table and key by key; errors name the place and what is allowed."""
+"""Reads TOML and JSON files within limits of size and depth, and tables in them key by key.
 
+Errors name the place and what is allowed.
+"""
+
+import json
+import math
 import tomllib
-from collections.abc import Generator
+import unicodedata
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
@@ -10,26 +16,98 @@ from typing import cast
 
 from gaitshift.errors import GaitshiftError
 
+MOST_BYTES = 1 << 20
+"""Size of the largest TOML or JSON file that is read [bytes]; ours: a hundred times that of any
+file of the package."""
 
-def tables_in(path: Path) -> dict[str, object]:
-    """The tables of a TOML file; `GaitshiftError`, without its path, where it cannot be read."""
+MOST_DEPTH = 20
+"""Greatest depth of lists and tables inside each other; ours: files of the package have 6."""
+
+MOST_LETTERS = 2000
+"""Length of the longest text of a key [characters]; ours: a description is a few sentences."""
+
+MOST_WHOLE = 1 << 53
+"""Greatest whole number; up to it a float is exact."""
+
+
+def bytes_in(path: Path, most: int) -> bytes:
+    """The bytes of a file of at most this size; `GaitshiftError`, without its path, otherwise."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            data = file.read(most + 1)
     except FileNotFoundError:
         raise GaitshiftError("no such file") from None
     except OSError as error:
         raise GaitshiftError(f"the file cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise GaitshiftError(
-            "the file must be TOML in UTF-8, got bytes that are not UTF-8"
-        ) from None
-    try:
-        tables = tomllib.loads(text)
-    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        raise GaitshiftError(f"the file is not valid TOML: {error}") from None
+    if len(data) > most:
+        raise GaitshiftError(f"the file must have {most} bytes or fewer")
+    return data
+
+
+def tables_in(path: Path) -> dict[str, object]:
+    """The tables of a TOML file; `GaitshiftError`, without its path, where it cannot be read."""
+    tables = _parsed(_text_in(path, "TOML"), tomllib.loads, "the file is not valid TOML")
     if not tables:
         raise GaitshiftError("the file is empty")
-    return tables
+    return cast(dict[str, object], tables)
+
+
+def json_in(path: Path) -> object:
+    """The value in a JSON file; `GaitshiftError`, without its path, where it cannot be read."""
+    return _parsed(_text_in(path, "JSON"), json.loads, "the file is not valid JSON")
+
+
+def json_of(text: str) -> object:
+    """The value of a JSON text; `GaitshiftError` where it is none, or too large or too deep."""
+    if len(text) > MOST_BYTES:
+        raise GaitshiftError(f"JSON must have {MOST_BYTES} characters or fewer, got {len(text)}")
+    return _parsed(text, json.loads, "not valid JSON")
+
+
+def _text_in(path: Path, kind: str) -> str:
+    try:
+        return bytes_in(path, MOST_BYTES).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise GaitshiftError(
+            f"the file must be {kind} in UTF-8, got bytes that are not UTF-8"
+        ) from None
+
+
+def _parsed(text: str, parse: Callable[[str], object], fault: str) -> object:
+    try:
+        value = parse(text)
+    except ValueError as error:  # the parser's own, or a number of thousands of digits
+        raise GaitshiftError(f"{fault}: {error}") from None
+    except RecursionError:
+        raise _too_deep() from None
+    level = [value]
+    for _ in range(MOST_DEPTH):
+        level = [inner for outer in level for inner in _inside(outer)]
+    if level:
+        raise _too_deep()
+    return value
+
+
+def _inside(value: object) -> list[object]:
+    """What a list or a table holds."""
+    if isinstance(value, dict):
+        return list(cast(dict[str, object], value).values())
+    return cast(list[object], value) if isinstance(value, list) else []
+
+
+def _too_deep() -> GaitshiftError:
+    return GaitshiftError(f"lists and tables must be at most {MOST_DEPTH} inside each other")
+
+
+def check_text(name: str, value: str) -> None:
+    """`GaitshiftError` for a text that is too long, or that no terminal or page can show."""
+    if len(value) > MOST_LETTERS:
+        raise GaitshiftError(
+            f"{name!r} must have {MOST_LETTERS} characters or fewer, got {len(value)}"
+        )
+    for letter in value:
+        if unicodedata.category(letter) in ("Cc", "Cs") and letter not in "\n\t":
+            raise GaitshiftError(f"{name!r} must be printable, got {shortened(ascii(value))}")
 
 
 @contextmanager
@@ -78,6 +156,7 @@ class Table:
         value = self.get(key)
         if not isinstance(value, str) or not value.strip():
             raise _wrong(key, "a text", value)
+        check_text(key, value)
         return value
 
     def flag(self, key: str, *, default: bool) -> bool:
@@ -92,17 +171,22 @@ class Table:
         value = self.get(key) if default is None else self._values.get(key, default)
         if not isinstance(value, int) or isinstance(value, bool):
             raise _wrong(key, "a whole number", value)
+        if not abs(value) <= MOST_WHOLE:
+            raise _wrong(key, f"a whole number of at most {MOST_WHOLE}", value)
         return value
 
     def number(self, key: str, *, default: float | None = None) -> float:
-        """Return a number, whole or not."""
+        """Return a finite number, whole or not."""
         value = self.get(key) if default is None else self._values.get(key, default)
         if not isinstance(value, int | float) or isinstance(value, bool):
             raise _wrong(key, "a number", value)
         try:
-            return float(value)
+            number = float(value)
         except OverflowError:
             raise _wrong(key, "a number of at most 1e308", value) from None
+        if not math.isfinite(number):
+            raise _wrong(key, "a finite number", value)
+        return number
 
     def pair(self, key: str, *, default: tuple[float, float]) -> tuple[float, float]:
         """Return two numbers, the lower and the upper end of a range."""
@@ -156,9 +240,12 @@ class Table:
         if not all(type(value) in (int, float) for value in values):
             raise _wrong(key, wanted, values)
         try:
-            return [float(value) for value in cast(list[float], values)]
+            numbers = [float(value) for value in cast(list[float], values)]
         except OverflowError:
             raise _wrong(key, "numbers of at most 1e308", values) from None
+        if not all(map(math.isfinite, numbers)):
+            raise _wrong(key, "finite numbers", values)
+        return numbers
 
     def _list(self, key: str, wanted: str) -> list[object]:
         value = self.get(key)

@@ -20,6 +20,9 @@ STREAMED = (".csv", ".parquet")
 BATCH, BLOCK = 65_536, 1 << 24
 """Batch sizes of `stream`: rows of a Parquet file, bytes of a CSV file."""
 
+MOST_BYTES = 256 << 20
+"""Size of the largest table that is read whole [bytes]; ours: a million iterations."""
+
 _LINE_END, _GROWING_LINE_END = "\n", "\r\n"
 """Line ends of tables that are written whole, and of those that grow (RFC 4180)."""
 
@@ -146,6 +149,10 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
     """Names of the columns, and rows: missing cells are None, surplus cells have the key None."""
+    if path.is_file() and path.stat().st_size > MOST_BYTES:
+        raise GaitshiftError(
+            f"{path} must have {MOST_BYTES >> 20} MB or less, got {path.stat().st_size >> 20} MB"
+        )
     try:
         with path.open(newline="") as file:
             reader = csv.DictReader(file)

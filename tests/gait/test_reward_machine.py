@@ -364,19 +364,28 @@ def test_a_change_is_punctual_for_two_steps_and_worth_nothing_half_a_dwell_later
     np.testing.assert_allclose(seen, list(table.values()), atol=1e-12)
 
 
-def test_the_cycle_takes_the_first_way_out_and_ends_where_there_is_none():
+def test_the_cycle_takes_the_way_back_wherever_the_way_to_an_end_stands_in_the_file():
     sink = {"name": "sink", "accepting": True}
     out = {"from": "FR_BL", "to": "sink", "down": [], "up": list(FEET)}
     there, back = TROT["transition"]
 
     def round_trip(*ways):
         machine = RewardMachine.from_dict(edited(state=[*TROT["state"], sink], transition=[*ways]))
-        return machine.cycle, machine.touchdowns
+        return machine.cycle, machine.touchdowns, machine.stride()
 
-    assert round_trip(there, back, out) == ((0, 1), (1, 1, 1, 1))
-    assert round_trip(back, out, there) == ((2, 0), (1, 1, 1, 1))
-    # The run ends on its second stance: FR and BL have come down, and nobody comes back.
-    assert round_trip(there, out, back) == ((0, 1), (0, 1, 1, 0))
+    assert round_trip(there, back, out) == ((0, 1), (1, 1, 1, 1), 40)
+    assert round_trip(back, out, there) == ((2, 0), (1, 1, 1, 1), 40)
+    assert round_trip(there, out, back) == ((0, 2), (1, 1, 1, 1), 40)
+    assert round_trip(out, there, back) == ((1, 2), (1, 1, 1, 1), 40)
+
+
+def test_the_cycle_of_a_machine_without_a_way_back_ends_where_the_run_ends():
+    """The run ends on its second stance: FR and BL have come down, and nobody comes back."""
+    sink = {"name": "sink", "accepting": True}
+    out = {"from": "FR_BL", "to": "sink", "down": [], "up": list(FEET)}
+    ways = [out, TROT["transition"][0]]
+    machine = RewardMachine.from_dict(edited(state=[*TROT["state"], sink], transition=ways))
+    assert (machine.cycle, machine.touchdowns) == ((1, 0), (0, 1, 1, 0))
 
 
 # Feet that have swung ---------------------------------------------------------------------------

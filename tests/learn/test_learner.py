@@ -86,7 +86,12 @@ class Toss(GaitEnv):
         ended = self.rng.random(32) < self.chance
         none = np.zeros(32, dtype=bool)
         info = {"reward_terms": {}, "bonus": none, "changed": none, "shows_stance": none}
-        info |= {"forward_speed": np.zeros(32), "final_obs": self.noise(), "_final_obs": ended}
+        info |= {
+            "forward_speed": np.zeros(32),
+            "diverged": none,
+            "final_obs": self.noise(),
+            "_final_obs": ended,
+        }
         return self.noise(), np.ones(32), ended, none, info
 
     def noise(self):
@@ -130,7 +135,12 @@ class Entrance(GaitEnv):
         self.in_b = ~cut
         none = np.zeros(32, dtype=bool)
         info = {"reward_terms": {}, "bonus": none, "changed": none, "shows_stance": none}
-        info |= {"forward_speed": np.zeros(32), "final_obs": final, "_final_obs": cut}
+        info |= {
+            "forward_speed": np.zeros(32),
+            "diverged": none,
+            "final_obs": final,
+            "_final_obs": cut,
+        }
         return self.look(), reward, none, cut, info
 
 

@@ -34,6 +34,7 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
     run, reported = whole
     figures = {"iteration", "stage", "steps", "wall_s", "reward", "speed", "changes_per_s"}
     figures |= {"stance_fraction", "survival", "value_loss", "action_std", "learning_rate"}
+    figures |= {"diverged"}
     weights = {field.name for field in fields(RewardConfig)}
     terms = weights - {"bonus_mode", *BONUS_SHARES}
     assert set(reported[0]) == figures | {f"reward/{name}" for name in terms}
@@ -222,3 +223,20 @@ def test_sixty_iterations_are_enough_to_find_the_cycle_of_a_gait(tmp_path):
     assert mean(early, "changes_per_s") < 1.5
     assert mean(late, "changes_per_s") > 3.0
     assert mean(late, "reward") > mean(early, "reward") + 3.0
+
+
+def test_divergences_are_counted_and_the_first_are_kept(tmp_path):
+    """Robot 1 diverges in the first step of every iteration."""
+    run = create(tmp_path / "run")
+    step = run.learner.env.step
+
+    def wild(actions):
+        if run.learner.env.world.divergences == []:
+            run.learner.env.world._applied[1, 3] = 1e30
+        return step(actions)
+
+    run.learner.env.step = wild
+    kept, reported = [], []
+    run.train(reported.append, keep=lambda lost, path: kept.append((lost.robot, path.name)))
+    assert [row["diverged"] for row in reported] == [1.0] * 6
+    assert kept == [(1, f"{iteration:06d}-1.npz") for iteration in range(1, 7)]

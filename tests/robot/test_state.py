@@ -73,6 +73,7 @@ def random_truth(*batch, seed=1):
         foot_force=rng.normal(size=(*batch, 4)),
         clearance=rng.normal(size=(*batch, 4)),
         body_contact=rng.random(batch) < 0.5,
+        diverged=rng.random(batch) < 0.5,
     )
 
 

@@ -67,6 +67,7 @@ def still(n):
         foot_force=np.zeros((n, 4)),
         clearance=np.zeros((n, 4)),
         body_contact=np.zeros(n, dtype=bool),
+        diverged=np.zeros(n, dtype=bool),
     )
     return sensed, truth
 

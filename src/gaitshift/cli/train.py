@@ -16,10 +16,11 @@ from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import flat_verdict
+from gaitshift.lab.evaluation import divergence_log, flat_verdict
 
 if TYPE_CHECKING:
     from gaitshift.learn.run import Row, Run
+    from gaitshift.sim.world import Divergence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +28,8 @@ class Train(RobotOption):
     """Train a gait with PPO: flat ground first, then rough ground with pushes.
 
     Writes config.json, progress.csv, verdicts.csv (a short evaluation at each checkpoint),
-    tensorboard/, checkpoints/ and policy.onnx. After Ctrl-C, --resume continues the run.
+    tensorboard/, checkpoints/ and policy.onnx; and where the simulation of a robot diverges,
+    diverged/, logs of its last second. After Ctrl-C, --resume continues the run.
     """
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
@@ -59,7 +61,7 @@ class Train(RobotOption):
         bar = _Bar(run)
         try:
             with bar:
-                path = run.train(bar, bar.judge)
+                path = run.train(bar, bar.judge, bar.keep)
         except KeyboardInterrupt:
             say(f"gaitshift: interrupted; continue with: gaitshift train --resume {run.folder}")
             sys.exit(130)
@@ -156,6 +158,10 @@ class _Bar:
         self.verdict = flat_verdict(policy.load(path, self._run.robot))
         return self.verdict
 
+    def keep(self, divergence: "Divergence", path: Path) -> None:
+        """Writes the last second of a robot whose simulation diverged."""
+        divergence_log(divergence, self._run.robot, self._run.machine).save(path)
+
     def __call__(self, row: "Row") -> None:
         self.row = row
         start, first = self._clock
@@ -166,6 +172,8 @@ class _Bar:
             f"{row['stage']}  {rate:,.0f} steps/s  {row['speed']:.2f} m/s  "
             f"survival {row['survival']:.2f}"
         )
+        if row["diverged"]:
+            seen += f"  {row['diverged']:.0f} diverged"
         if self.verdict:
             seen += f"  {_spell(self.verdict)}"
         self._progress.update(self._task, completed=row["iteration"], seen=seen)

@@ -17,6 +17,10 @@ from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Robot
 
+MOST_BYTES = 64 << 20
+"""Size of the largest policy file that is read [bytes]; ours: a hundred times that of a shipped
+one."""
+
 _SHIPPED = Path(__file__).parent / "policies"
 
 _ONLY_WHAT_IS_ASKED: Any = cast(Any, onnxruntime).RunOptions()
@@ -108,8 +112,13 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
             )
     if not path.is_file():
         raise GaitshiftError(f"no policy file {path}")
-    session = _open(path)
-    info = read_info(path, cast(Any, session).get_modelmeta().custom_metadata_map)
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise GaitshiftError(
+            f"{path}: a policy file must have {MOST_BYTES >> 20} MB or less, got {size >> 20} MB"
+        )
+    session, metadata = _open(path)
+    info = read_info(path, metadata)
     try:
         policy = Policy(path, info, RewardMachine.from_dict(info.machine), session, robot)
         _check(policy)
@@ -118,12 +127,20 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
     return policy
 
 
-def _open(path: Path) -> onnxruntime.InferenceSession:
+def _open(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
+    """The network of a file, and its metadata; all its texts are UTF-8."""
     options = cast(Any, onnxruntime).SessionOptions()
     options.intra_op_num_threads = 1  # the networks are small, and the physics uses the cores
     options.log_severity_level = 4
     try:
-        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        session: Any = onnxruntime.InferenceSession(
+            path,
+            options,
+            providers=["CPUExecutionProvider"],
+            enable_fallback=0,  # it prints, and tries the same again
+        )
+        _ = [end.name for end in (*session.get_inputs(), *session.get_outputs())]
+        return session, session.get_modelmeta().custom_metadata_map
     except Exception as error:  # onnxruntime has a class for each fault, without a common base
         raise GaitshiftError(
             f"{path} is a truncated or damaged ONNX file; export it again from its run"
@@ -165,3 +182,22 @@ def _check(policy: Policy) -> None:
     wanted = inputs["observation"][1]
     if expected != info.observation or wanted != policy.observation.size:
         raise GaitshiftError(f"the observation slices must match the network's {wanted} inputs")
+    _try(policy)
+
+
+def _try(policy: Policy) -> None:
+    """`GaitshiftError` for a network that does not run on several robots, or gives no numbers."""
+    outputs = {"action": (2, 12)} | ({"value": (2, 1)} if policy.has_critic else {})
+    nothing = np.zeros((2, policy.observation.size), dtype=np.float32)
+    for name, shape in outputs.items():
+        try:
+            given = policy(nothing) if name == "action" else policy.value(nothing)[:, None]
+        except Exception as error:  # as in `_open`
+            raise GaitshiftError(
+                f"the network cannot give '{name}' for two robots; export it again from its run"
+            ) from error
+        if given.shape != shape or not np.isfinite(given).all():
+            raise GaitshiftError(
+                f"the network must give finite numbers as '{name}', of the shape {shape} for two "
+                f"robots, got the shape {given.shape}; export it again from its run"
+            )

@@ -7,7 +7,7 @@ from pathlib import Path
 from reprlib import repr as shortened
 from typing import Any, cast
 
-from gaitshift.data import Table
+from gaitshift.data import Table, json_of, located
 from gaitshift.errors import GaitshiftError
 
 FORMAT_VERSION = 2
@@ -75,15 +75,14 @@ def read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
             f"{path} lacks the metadata '{missing[0]}'; export it again from its run"
         )
     try:
-        values = {name: json.loads(metadata[f"gaitshift.{name}"]) for name in fields}
-    except json.JSONDecodeError as error:
-        raise GaitshiftError(
-            f"{path} has damaged metadata; export it again from its run"
-        ) from error
-    try:
-        return _info_of(values)
+        return _info_of({name: _value(name, metadata[f"gaitshift.{name}"]) for name in fields})
     except GaitshiftError as error:
         raise GaitshiftError(f"{path}: metadata {error}; export it again from its run") from error
+
+
+def _value(name: str, text: str) -> object:
+    with located(f"'{name}'"):
+        return json_of(text)
 
 
 def _info_of(values: dict[str, object]) -> PolicyInfo:

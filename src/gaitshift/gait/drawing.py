@@ -4,7 +4,9 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false
 
 import math
+import re
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -28,6 +30,7 @@ _FOOT = {"FL": (-1, 1), "FR": (1, 1), "BL": (-1, -1), "BR": (1, -1)}
 """Where a foot is drawn: to the right of the body, towards its nose."""
 
 _CARD, _END_CARD = (1.7, 2.1), (1.7, 0.9)
+_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _NEIGHBOURS = 5.0
 _BULGE = -0.28
 _INCHES = 0.62
@@ -52,7 +55,7 @@ def draw(machine: RewardMachine, path: Path) -> None:
     bottom = min(y for _, y in middles.values()) - 2.4
     top = max(y for _, y in middles.values()) + 3.6
     with cast(Any, matplotlib).rc_context(
-        {"svg.hashsalt": "gaitshift", "font.family": "DejaVu Sans"}
+        {"svg.hashsalt": "gaitshift", "font.family": "DejaVu Sans", "text.parse_math": False}
     ):
         size = (2 * half_width * _INCHES, (top - bottom) * _INCHES)
         figure = Figure(figsize=size, facecolor=_PAPER)
@@ -212,12 +215,41 @@ def _draw_guard(axes: "Axes", edge: Transition, middle: tuple[float, float]) -> 
 
 def mermaid(machine: RewardMachine) -> str:
     """Write the machine as a Mermaid `stateDiagram-v2`: a line a state, a line an edge."""
+    names = [state.name for state in machine.states]
+    ids = mermaid_ids(names)
     lines = ["stateDiagram-v2", "    direction LR"]
-    lines += [f"    {s.name} : {s.name}, {s.stance_text()}" for s in machine.states]
-    lines += [f"    [*] --> {machine.states[machine.initial].name}"]
+    lines += [f"    {ids[s.name]} : {s.name}, {s.stance_text()}" for s in machine.states]
+    lines += [f"    [*] --> {ids[names[machine.initial]]}"]
     lines += [
-        f"    {edge.source} --> {edge.target} : {', '.join(edge.guard.demands())}"
+        f"    {ids[edge.source]} --> {ids[edge.target]} : {', '.join(edge.guard.demands())}"
         for edge in machine.edges
     ]
-    lines += [f"    {machine.states[u].name} --> [*]" for u in machine.accepting]
+    lines += [f"    {ids[names[u]]} --> [*]" for u in machine.accepting]
     return "\n".join(lines) + "\n"
+
+
+_MERMAID_WORDS = frozenset(
+    (
+        *("accdescr", "acctitle", "as", "choice", "class", "classdef", "click", "default"),
+        *("direction", "end", "fork", "hide", "href", "join", "note", "root", "scale", "state"),
+        *("statediagram", "style"),
+    )
+)
+"""Words that mean something else to Mermaid than a state, in small letters."""
+
+
+def mermaid_ids(names: Sequence[str]) -> dict[str, str]:
+    """An identifier that Mermaid reads as a state for each of some names, itself where it can be.
+
+    In others, signs become underscores, and a number makes the identifier unlike all others.
+    """
+    plain = [n for n in names if _WORD.fullmatch(n) and n.lower() not in _MERMAID_WORDS]
+    ids = dict(zip(plain, plain, strict=True))
+    for name in names:
+        number = 1
+        while name not in ids:
+            made = f"{re.sub('[^A-Za-z0-9]', '_', name)}_{number}"
+            if made not in ids.values():
+                ids[name] = made
+            number += 1
+    return ids

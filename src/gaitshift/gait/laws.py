@@ -20,9 +20,16 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait.elements import State, Transition, feet_text
 from gaitshift.robot.legs import LEGS
 
+MOST_STATES, MOST_EDGES = 64, 256
+"""Most states and transitions of a machine; ours: the pairs of transitions are compared, and there
+are 16 contact patterns."""
+
 
 def check(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
     """Raise a `GaitshiftError` naming the first law that is broken, and where."""
+    for what, given, most in (("states", states, MOST_STATES), ("transitions", edges, MOST_EDGES)):
+        if len(given) > most:
+            raise GaitshiftError(f"{what} must be {most} or fewer, got {len(given)}")
     _check_names(states, edges)
     _check_ways_out(states, edges)
     _check_reached(states, edges)
@@ -125,10 +132,15 @@ def _title(number: int, edge: Transition) -> str:
 def cycle(states: tuple[State, ...], edges: tuple[Transition, ...]) -> tuple[int, ...]:
     """Numbers of the edges from the first state on, until a state repeats.
 
-    Where a state has several outgoing edges, the first in the file is taken. For a machine that
-    ends in an accepting state, these are the edges until its end.
+    Where a state has several outgoing edges, the first in the file that leads back to the first
+    state is taken; where none does, the first. For a machine that ends in an accepting state, these
+    are the edges until its end.
     """
-    ways = {edge.source: number for number, edge in reversed(list(enumerate(edges)))}
+    home = {states[0].name}
+    while new := {edge.source for edge in edges if edge.target in home} - home:
+        home |= new
+    ranked = sorted(enumerate(edges), key=lambda numbered: numbered[1].target not in home)
+    ways = {edge.source: number for number, edge in reversed(ranked)}
     followed: list[int] = []
     name = states[0].name
     while name in ways and ways[name] not in followed:

@@ -1,18 +1,17 @@
 """The log of a run of N robots, step by step: the format of `--log FILE.npz`."""
 
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.lab.log_check import checked
+from gaitshift.lab.log_check import check_names, checked
+from gaitshift.lab.npz import arrays_in
 from gaitshift.robot.state import Batch, Privileged, Proprioception
 
 FORMAT_VERSION = 2
@@ -117,9 +116,7 @@ class Log(Batch):
         """
         types = _types()
         values = _read(path, types)
-        for name in ("robot", "terrain"):
-            values[name] = str(values[name])
-        values["gaits"] = tuple(str(name) for name in np.atleast_1d(values["gaits"]))
+        values |= check_names(path, values)
         plain = {"sensed.has_heading": bool, "sensed.period": float, "sensed.mass": float}
         for name, kind in plain.items():
             if name not in values:
@@ -128,6 +125,8 @@ class Log(Batch):
                 raise GaitshiftError(
                     f"{path}: '{name}' must be one value, got the shape {np.shape(values[name])}"
                 )
+            if values[name].dtype.kind not in "biuf":
+                raise GaitshiftError(f"{path}: '{name}' must be a number, got {values[name].dtype}")
             values[name] = kind(np.ravel(values[name])[0])
         values = checked(path, values, {name: types[name] for name in values})
         records = {name: _record(name, made, values) for name, made in _RECORDS.items()}
@@ -154,27 +153,20 @@ def _record(name: str, made: type[Any], values: Mapping[str, Any]) -> Any:
 
 def _read(path: Path, types: Mapping[str, Any]) -> dict[str, Any]:
     """The entries of a file that belong to a log."""
-    try:
-        with path.open("rb") as file:
-            entries = np.load(file)
-            if not isinstance(entries, np.lib.npyio.NpzFile):
-                raise ValueError("it holds a single array")
-            version = int(cast(Any, entries).get("format_version", 1))
-            if version == 1 and "qpos" in entries:
-                raise GaitshiftError(
-                    f"{path} is a log of gaitshift 0.1, which later versions do not read; write it "
-                    "anew with the command that made it (demo, record or evaluate --log)"
-                )
-            if version not in (1, FORMAT_VERSION):
-                raise GaitshiftError(
-                    f"{path} is a log of format {version}; this version reads format "
-                    f"{FORMAT_VERSION}"
-                )
-            values: dict[str, Any] = {name: entries[name] for name in types if name in entries}
-    except FileNotFoundError as error:
-        raise GaitshiftError(f"no log file {path}") from error
-    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
-        raise GaitshiftError(f"{path} is not a complete npz file: {error}") from error
+    values: dict[str, Any] = {**arrays_in(path, ("format_version", "qpos", *types))}
+    version = values.pop("format_version", np.array(1))
+    if version.shape != () or version.dtype.kind not in "iu":
+        raise GaitshiftError(f"{path}: 'format_version' must be a whole number, got {version!r}")
+    if version == 1 and "qpos" in values:
+        raise GaitshiftError(
+            f"{path} is a log of gaitshift 0.1, which later versions do not read; write it "
+            "anew with the command that made it (demo, record or evaluate --log)"
+        )
+    if version not in (1, FORMAT_VERSION):
+        raise GaitshiftError(
+            f"{path} is a log of format {version}; this version reads format {FORMAT_VERSION}"
+        )
+    values.pop("qpos", None)
     missing = [name for name in types if name not in values and not _is_optional(types[name])]
     if missing:
         raise GaitshiftError(f"{path} is not a gaitshift log: it lacks '{missing[0]}'")

@@ -2,14 +2,34 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 import numpy as np
 
+from gaitshift.data import check_text, located
 from gaitshift.errors import GaitshiftError
 
 _MAY_BE_NAN = ("sensed.value", "k", "threshold")
 """Arrays that may hold NaN; all others hold finite numbers."""
+
+MOST_POSITION, MOST_REACH = 100_000.0, 100.0
+"""Greatest coordinate of anything in the world, and of a foot from its base [m]; ours: the first is
+that of `World`, and no leg is as long as the second."""
+
+MOST_NUMBER, MOST_COUNT = 1e9, 1e30
+"""Greatest of other numbers, in SI units, and of those without a unit: counters, values of critics;
+ours: single precision holds them."""
+
+MOST_GAITS = 64
+"""Most gaits of a log; ours: eight times those of the package."""
+
+MOST_STATES = 256
+"""States of a machine are below this number; ours: more than a machine can have."""
+
+_POSITIONS = (
+    *("truth.base_position_w", "truth.foot_position_w", "truth.clearance"),
+    *("terrain_height", "terrain_size", "terrain_origin"),
+)
 
 _FIRST = "sensed.contact"
 """The array whose shape gives the number of steps and robots."""
@@ -44,6 +64,24 @@ def checked(path: Path, values: Mapping[str, Any], declared: Mapping[str, Any]) 
     _check_numbers(path, whole)
     _check_time(path, whole["sensed.time"], whole["sensed.period"])
     return whole
+
+
+def check_names(path: Path, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Names of robot, ground and gaits as texts; `GaitshiftError` where they are no names."""
+    names: dict[str, Any] = {}
+    with located(str(path)):
+        for key, most in (("robot", 1), ("terrain", 1), ("gaits", MOST_GAITS)):
+            array: np.ndarray = np.atleast_1d(values[key])
+            if array.dtype.kind != "U" or array.ndim != 1 or not 1 <= array.size <= most:
+                raise GaitshiftError(
+                    f"'{key}' must be {most} text{'s or fewer' * (most > 1)}, got {array.dtype} "
+                    f"of the shape {array.shape}"
+                )
+            texts = tuple(str(text) for text in array)
+            for text in texts:
+                check_text(key, text)
+            names[key] = texts if key == "gaits" else texts[0]
+    return names
 
 
 def _shaped(
@@ -88,12 +126,19 @@ def _declared(annotation: Any) -> tuple[tuple[str, ...], str] | None:
 def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
     """Raises `GaitshiftError` for impossible values."""
     for name, value in values.items():
-        if name in _MAY_BE_NAN or not isinstance(value, np.ndarray) or value.dtype.kind != "f":
+        if not isinstance(value, np.ndarray) or value.dtype.kind != "f":
             continue
-        finite = np.isfinite(np.asarray(value, dtype=float))
-        if not finite.all():
+        finite: np.ndarray = np.isfinite(cast(Any, value))
+        if not finite.all() and name not in _MAY_BE_NAN:
             raise GaitshiftError(
                 f"{path}: '{name}' must be finite, got NaN or infinity{_where(~finite, name)}"
+            )
+        most = limit_of(name)
+        wrong: np.ndarray = finite & (np.abs(cast(Any, value)) > most)
+        if wrong.any():
+            raise GaitshiftError(
+                f"{path}: '{name}' must be {-most:g} to {most:g}, got "
+                f"{value[wrong][0]:.3g}{_where(wrong, name)}"
             )
     for name in ("sensed.orientation", "truth.base_quaternion_w"):
         length = np.linalg.norm(values[name], axis=-1)
@@ -104,12 +149,32 @@ def _check_numbers(path: Path, values: Mapping[str, Any]) -> None:
                 f"{_where(wrong, name)}"
             )
     check_mass(path, values.get("sensed.mass", 1.0))
+    if min(values["terrain_height"].shape) < 2 or not values["terrain_size"].min() > 0:
+        raise GaitshiftError(
+            f"{path}: the ground must have two or more rows and columns and a size above 0, got "
+            f"{values['terrain_height'].shape} on {values['terrain_size'].tolist()} m"
+        )
+    state = values["machine_state"]
+    if state.min() < 0 or state.max() >= MOST_STATES:
+        raise GaitshiftError(
+            f"{path}: 'machine_state' must be 0 to {MOST_STATES - 1}, got {state.min()} to "
+            f"{state.max()}"
+        )
     gait, names = values["gait"], values["gaits"]
     if gait.min() < 0 or gait.max() >= len(names):
         raise GaitshiftError(
             f"{path}: 'gait' must be 0 to {len(names) - 1}, an index into 'gaits', got "
             f"{gait.min()} to {gait.max()}"
         )
+
+
+def limit_of(name: str) -> float:
+    """Greatest number of an array of a log file, or of a column of a table."""
+    if {name, f"sensed.{name}"} & {*_MAY_BE_NAN, "sensed.time"}:  # the period says more on times
+        return MOST_COUNT
+    if name == "sensed.foot_position_b" or name.startswith("foot_"):
+        return MOST_REACH
+    return MOST_POSITION if name in _POSITIONS else MOST_NUMBER
 
 
 def check_mass(path: Path, mass: float) -> None:

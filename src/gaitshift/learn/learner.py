@@ -120,6 +120,7 @@ class _Statistics:
     def __init__(self) -> None:
         self._sums: dict[str, float] = {}
         self._steps = 0
+        self._diverged = 0
 
     def add(
         self,
@@ -129,6 +130,7 @@ class _Statistics:
         info: dict[str, Any],
     ) -> None:
         """Adds one step of all robots."""
+        self._diverged += int(info["diverged"].sum())
         seen = {
             "reward": reward,
             "reward/bonus": info["bonus"],
@@ -145,10 +147,12 @@ class _Statistics:
     def means(self) -> dict[str, float]:
         """Mean of each quantity.
 
-        `survival` is the probability of no fall in 10 s at the present rate of falls.
+        `survival` is the probability of no fall in 10 s at the present rate of falls. `diverged` is
+        not a mean but the number of robots whose simulation diverged, which count as falls.
         """
         means = {name: total / self._steps for name, total in self._sums.items()}
         means["survival"] = float((1.0 - means.pop("falls")) ** 1000)
+        means["diverged"] = float(self._diverged)
         return means
 
 

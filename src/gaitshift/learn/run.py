@@ -17,6 +17,7 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from gaitshift import table
+from gaitshift.data import json_in, located
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
@@ -28,15 +29,22 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
+from gaitshift.sim.world import Divergence
 from gaitshift.table import Row
 
 CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
-PROGRESS, VERDICTS = "progress.csv", "verdicts.csv"
+PROGRESS, VERDICTS, DIVERGED = "progress.csv", "verdicts.csv", "diverged"
 
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
 Judge = Callable[[Path], Row]
 """Evaluates a policy file and returns its verdict, a row of `verdicts.csv`."""
+
+Keep = Callable[[Divergence, Path], None]
+"""Writes the last second of a robot whose simulation diverged to a file."""
+
+MOST_FILES = 8
+"""Most files of divergences in a run's folder; ours: enough to see a cause."""
 
 
 class Run:
@@ -116,34 +124,39 @@ class Run:
     @classmethod
     def resume(cls, folder: Path) -> "Run":
         """The run of a folder, as it was at its last checkpoint."""
+        if not (folder / CONFIG).is_file():
+            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}")
+        with located(f"{folder / CONFIG} is damaged"):
+            config: Any = json_in(folder / CONFIG)
         try:
-            config = json.loads((folder / CONFIG).read_text())
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
             robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
             run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
-        except (FileNotFoundError, NotADirectoryError) as error:
-            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}") from error
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
         except cattrs.BaseValidationError as error:
             faults = "; ".join(cattrs.transform_error(error))
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {faults}") from error
         except GaitshiftError as error:
             raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
-        checkpoints = sorted((folder / CHECKPOINTS).glob("*.pt"))
+        checkpoints = run._checkpoints()
         if not checkpoints:
             raise GaitshiftError(f"{folder / CHECKPOINTS} has no checkpoint to resume from")
         run._load_checkpoint(checkpoints[-1])
         return run
 
     def train(
-        self, report: Callable[[Row], None] = lambda row: None, judge: Judge | None = None
+        self,
+        report: Callable[[Row], None] = lambda row: None,
+        judge: Judge | None = None,
+        keep: Keep | None = None,
     ) -> Path:
         """Runs to the end, calling `report` after each iteration; gives the policy's path.
 
         At each checkpoint the policy is written for `judge`, and its verdict is saved. If a kill
-        prevented the verdict of the present checkpoint, that one is made first.
+        prevented the verdict of the present checkpoint, that one is made first. With `keep`, the
+        first `MOST_FILES` divergences are written to `diverged/ITERATION-ROBOT.npz`.
         After Ctrl-C the last checkpoint and the present policy are on disk.
         """
         writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
@@ -156,6 +169,7 @@ class Run:
                 row = self.iterate()
                 self._log(row, writer)
                 report(row)
+                self._keep_divergences(keep)
                 if self._is_checkpoint():
                     self._save_checkpoint()
                     if judge is not None:
@@ -192,7 +206,7 @@ class Run:
         layers = deepcopy(self.learner.ppo.actor.mlp)
         total = {name: weights.clone() for name, weights in layers.state_dict().items()}
         count = 1
-        for path in sorted((self.folder / CHECKPOINTS).glob("*.pt")):
+        for path in self._checkpoints():
             earlier = int(path.stem)
             if earlier < self.iteration and self.recipe.is_averaged(earlier):
                 state = _read_checkpoint(path)["ppo"]["actor_state_dict"]
@@ -238,6 +252,11 @@ class Run:
         last = self.iteration == self.recipe.iterations
         return last or self.iteration % self.recipe.checkpoint_every == 0
 
+    def _checkpoints(self) -> list[Path]:
+        """The files of the run's checkpoints, in their order."""
+        found = (self.folder / CHECKPOINTS).glob("*.pt")
+        return sorted(path for path in found if path.stem.isdecimal())
+
     def _save_checkpoint(self) -> None:
         path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
         part = path.with_suffix(".part")
@@ -271,6 +290,15 @@ class Run:
             if name not in ("iteration", "stage"):
                 writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
 
+    def _keep_divergences(self, keep: Keep | None) -> None:
+        seen = self.learner.env.world.divergences
+        folder = self.folder / DIVERGED
+        for divergence in seen:
+            if keep is not None and len(list(folder.glob("*.npz"))) < MOST_FILES:
+                folder.mkdir(exist_ok=True)
+                keep(divergence, folder / f"{self.iteration:06d}-{divergence.robot}.npz")
+        seen.clear()
+
     def _lacks_verdict(self) -> bool:
         if self.iteration == 0 or not self._is_checkpoint():
             return False
@@ -282,9 +310,17 @@ class Run:
         table.append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
 
 
+_CHECKPOINT = {"iteration": int, "wall_s": float, "torch_rng": torch.Tensor, "ppo": dict}
+"""What a checkpoint holds."""
+
+
 def _read_checkpoint(path: Path) -> dict[str, Any]:
     try:
-        return torch.load(path, weights_only=True)
+        state = torch.load(path, weights_only=True)
+        for name, kind in _CHECKPOINT.items():
+            if not isinstance(state[name], kind):
+                raise TypeError(f"'{name}' is a {type(state[name]).__name__}")
+        return state
     except Exception as error:  # torch has no common class for a damaged file
         raise GaitshiftError(
             f"{path} is damaged; remove it to resume from the checkpoint before it"

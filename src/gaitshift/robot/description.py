@@ -4,6 +4,7 @@ Another quadruped is another `Robot` value: its MJCF needs a free joint, twelve 
 joints in the order legs × (HAA, HFE, KFE), and per leg the sensors this module names.
 """
 
+import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -11,11 +12,27 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift.data import check_text
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.legs import JOINTS, LEGS
 
 if TYPE_CHECKING:
     import mujoco
+
+MOST_GAIN = 100_000.0
+"""Greatest gain of a joint [N·m/rad, N·m·s/rad]; ours: a thousand times that of a large robot."""
+
+RANGES = {
+    "foot_radius": (0.001, 1.0),
+    "effort_limit": (0.01, 10_000.0),
+    "velocity_limit": (0.1, 1000.0),
+    "action_scale": (0.001, 1.0),
+}
+"""Ranges of a robot's numbers [m, N·m, rad/s, rad]; ours: far beyond any robot that walks."""
+
+MOST_STANCE = 2 * np.pi
+"""Greatest joint angle of a stance [rad]; ours: with the largest action it is a target that
+`World` takes."""
 
 _MODELS = Path(__file__).parent / "models"
 
@@ -28,6 +45,13 @@ class Gains:
     """[N·m/rad]"""
     kd: float
     """[N·m·s/rad]"""
+
+    def __post_init__(self) -> None:
+        if not (0 < self.kp <= MOST_GAIN and 0 <= self.kd <= MOST_GAIN):
+            raise GaitshiftError(
+                f"kp must be above 0 and kd 0 or more, both at most {MOST_GAIN:g}, got "
+                f"{self.kp:g} and {self.kd:g}"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,10 +80,23 @@ class Robot:
     """Presets by name; `default` is required."""
 
     def __post_init__(self) -> None:
+        check_text("name", self.name)
         if len(self.stance) != 12:
             raise GaitshiftError(
                 f"robot {self.name}: stance must have 12 joint angles, got {len(self.stance)}"
             )
+        for angle in self.stance:
+            if not abs(angle) <= MOST_STANCE:
+                raise GaitshiftError(
+                    f"robot {self.name}: angles of the stance must be {-MOST_STANCE:.3g} to "
+                    f"{MOST_STANCE:.3g} rad, got {angle:g}"
+                )
+        for key, (least, most) in RANGES.items():
+            value: float = getattr(self, key)
+            if not least <= value <= most:
+                raise GaitshiftError(
+                    f"robot {self.name}: {key} must be {least:g} to {most:g}, got {value:g}"
+                )
         if "default" not in self.gains:
             raise GaitshiftError(
                 f"robot {self.name}: gains must have a preset 'default', got {list(self.gains)}"
@@ -97,6 +134,9 @@ class Robot:
         """
         import mujoco
 
+        if mujoco.get_mju_user_warning() is None:
+            # By default MuJoCo writes a file MUJOCO_LOG.TXT into the working directory.
+            mujoco.set_mju_user_warning(logging.getLogger("mujoco").info)
         spec = mujoco.MjSpec.from_file(str(self.model_file))
         for actuator in cast("list[mujoco.MjsActuator]", spec.actuators):
             actuator.gainprm[0] = gains.kp

@@ -1,5 +1,6 @@
 """A user's robot: its numbers from a TOML file, checked together with its model."""
 
+import warnings
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, cast
@@ -12,6 +13,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Gains, Robot
 from gaitshift.robot.legs import JOINTS, LEGS
+from gaitshift.robot.mjcf_limits import check_mjcf
 
 _NUMBERS = ("foot_radius", "effort_limit", "velocity_limit", "action_scale")
 _KEYS = ("name", "model", "stance", *_NUMBERS, "gains")
@@ -41,9 +43,6 @@ def read_robot(path: Path) -> Robot:
         if name == ANYMAL_B.name:
             raise GaitshiftError(f"'name' must not be that of a robot of the package, got '{name}'")
         numbers = {key: table.number(key) for key in _NUMBERS}
-        for key, value in numbers.items():
-            if not value > 0:
-                raise GaitshiftError(f"'{key}' must be above 0, got {value:g}")
         stance = table.numbers("stance", 12, "12 angles: FL, FR, BL, BR × (HAA, HFE, KFE)")
         gains = {preset: _gains(preset, of) for preset, of in table.table("gains").items()}
         model_file = path.parent / table.text("model")
@@ -82,19 +81,23 @@ def from_dict(data: dict[str, Any]) -> Robot:
 def _gains(preset: str, data: object) -> Gains:
     with located(f"gains.{preset}"):
         table = Table(data, keys=("kp", "kd"))
-        kp, kd = table.number("kp"), table.number("kd")
-        if kp <= 0 or kd < 0:
-            raise GaitshiftError(f"kp must be above 0 and kd 0 or more, got {kp:g} and {kd:g}")
-        return Gains(kp=kp, kd=kd)
+        return Gains(kp=table.number("kp"), kd=table.number("kd"))
 
 
 def _checked_model(robot: Robot) -> mujoco.MjModel:
     """The compiled model of the robot; `GaitshiftError` where `World` cannot use it."""
     if not robot.model_file.is_file():
         raise GaitshiftError("no such file")
+    check_mjcf(robot.model_file)
     try:
-        model = cast(mujoco.MjModel, robot.spec(robot.gains_of("default")).compile())
-    except ValueError as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)
+            model = cast(mujoco.MjModel, robot.spec(robot.gains_of("default")).compile())
+    except UserWarning as warning:
+        raise GaitshiftError(
+            f"MuJoCo warns of the model: {' '.join(str(warning).split())}"
+        ) from None
+    except (ValueError, mujoco.FatalError, mujoco.UnexpectedError) as error:
         raise GaitshiftError(
             f"MuJoCo cannot read the model: {' '.join(str(error).split())}"
         ) from None

@@ -225,6 +225,9 @@ class Privileged(Moving):
     """Height of each foot's lowest point above the ground under it [m]."""
     body_contact: Bool[np.ndarray, "*batch"]
     """Whether the base touches the ground, which ends an episode in the paper."""
+    diverged: Bool[np.ndarray, "*batch"]
+    """Whether the simulation diverged in the step that ended here: the robot has failed, and the
+    other fields describe it after it was set down again."""
 
 
 def rotation_of(quaternion: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, "*batch 3 3"]:

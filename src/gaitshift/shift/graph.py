@@ -1,9 +1,11 @@
 """The gait graph: gaits as nodes, shift conditions on edges. Only the graph counts k."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from reprlib import repr as shortened
 from typing import Any
 
 import numpy as np
@@ -11,10 +13,16 @@ from jaxtyping import Bool, Float, Int
 
 from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
+from gaitshift.gait.drawing import mermaid_ids
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift.rule import Modulation, Rule
 from gaitshift.shift.statistic import begun_anew
 from gaitshift.shift.statistics import Watched, watch
+
+MOST_EDGES = 256
+"""Most edges of a graph; ours: their pairs are compared, and eight gaits have 56."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ -]*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +99,16 @@ class GaitGraph:
     def __post_init__(self) -> None:
         if not self.edges:
             raise GaitshiftError("a gait graph must have at least one edge, got none")
+        if len(self.edges) > MOST_EDGES:
+            raise GaitshiftError(
+                f"a gait graph must have {MOST_EDGES} edges or fewer, got {len(self.edges)}"
+            )
+        for name in (*self.gaits, *self.statistics):
+            if not _NAME.fullmatch(name):
+                raise GaitshiftError(
+                    "names of gaits and statistics must be letters, digits, blanks, '_' and '-', a "
+                    f"letter first, got {shortened(name)}"
+                )
         for edge in self.edges:
             if edge.source == edge.target:
                 raise GaitshiftError(
@@ -204,9 +222,13 @@ class GaitGraph:
 
     def mermaid(self) -> str:
         """The graph as a Mermaid `stateDiagram-v2`: one line per edge, with its rule."""
-        lines = ["stateDiagram-v2", "    direction LR", f"    [*] --> {self.start}"]
+        ids = mermaid_ids(self.gaits)
+        lines = ["stateDiagram-v2", "    direction LR"]
+        lines += [f"    {ids[gait]} : {gait}" for gait in self.gaits if ids[gait] != gait]
+        lines += [f"    [*] --> {ids[self.start]}"]
         for edge in self.edges:
             unit = self.statistics[edge.statistic].unit
             rule = f"{edge.statistic} {edge.rule.when} {edge.rule.alpha:g} {unit}".rstrip()
-            lines.append(f"    {edge.source} --> {edge.target} : {rule}, k over {edge.rule.beta:g}")
+            ends = f"{ids[edge.source]} --> {ids[edge.target]}"
+            lines.append(f"    {ends} : {rule}, k over {edge.rule.beta:g}")
         return "\n".join(lines) + "\n"

@@ -102,7 +102,7 @@ class Walk:
         sensed, truth = world.step(target)
         self.steps += 1
         is_off = (truth.clearance < -OVER_THE_EDGE).all(axis=1)
-        self.fallen = self.fallen | truth.body_contact | is_off
+        self.fallen = self.fallen | truth.body_contact | truth.diverged | is_off
         controller.see(sensed, self._asked)
         self.sensed = replace(
             sensed,

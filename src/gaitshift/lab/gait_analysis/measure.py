@@ -193,6 +193,7 @@ def measure(
     Robots are pooled. A figure is None where there was nothing to measure.
 
     - `survival`: share of robots that never fell, warm-up included.
+    - `diverged`: number of robots whose simulation diverged, warm-up included; they have fallen.
     - `speed_mean` [m/s]: mean velocity along body x; `speed_error` [m/s]: its distance from the
       mean command; `speed_rmse` [m/s]: root mean square of the difference at each step.
     - `heading_drift` [rad/s]: root mean square over robots of the net turn less the commanded turn,
@@ -226,6 +227,7 @@ def measure(
     sample = Sample.of(log, warm_up)
     figures: dict[str, Any] = {
         "survival": float(1.0 - log.fallen[-1].mean()),
+        "diverged": int(log.truth.diverged.any(axis=0).sum()),
         **base_figures(sample, robot),
         **feet_figures(sample, machines),
         "lateral_error_p95": lateral_error(log),

@@ -11,7 +11,13 @@ from jaxtyping import Float
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.labelled_run import LabelledRun, Way, rough_ground
 from gaitshift.lab.log import Log
-from gaitshift.lab.log_check import LEAST_PERIOD, MOST_PERIOD, RATE_TOLERANCE, check_mass
+from gaitshift.lab.log_check import (
+    LEAST_PERIOD,
+    MOST_PERIOD,
+    RATE_TOLERANCE,
+    check_mass,
+    limit_of,
+)
 from gaitshift.robot.legs import JOINTS, LEGS
 from gaitshift.robot.state import Proprioception, orientation_of
 from gaitshift.shift import LegOdometry
@@ -169,6 +175,13 @@ def _check_values(
         if bad.size:
             raise GaitshiftError(
                 f"{path}: row {rows + bad[0] + 1}, '{name}' must be a finite number"
+            )
+        most = limit_of(name)
+        far = np.flatnonzero(np.abs(values) > most)
+        if far.size:
+            raise GaitshiftError(
+                f"{path}: row {rows + far[0] + 1}, '{name}' must be {-most:g} to {most:g}, got "
+                f"{values[far[0]]:.3g}"
             )
     apart = np.diff(batch["time"], prepend=before)
     wrong = np.flatnonzero(apart <= 0)

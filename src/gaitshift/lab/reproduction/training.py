@@ -11,10 +11,12 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from reprlib import repr as shortened
+from typing import Any, cast
 
 from gaitshift import table
 from gaitshift.control import policy
+from gaitshift.data import json_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.reproduction.plan import Job
 from gaitshift.learn.learner import DivergedError
@@ -75,7 +77,7 @@ def _trained_to_the_end(job: Job, folder: Path) -> bool:
     path = folder / POLICY
     if not path.is_file():
         return False
-    return policy.load(path).info.training["iterations"] == job.recipe.iterations
+    return policy.load(path).info.training.get("iterations") == job.recipe.iterations
 
 
 def _check_same(job: Job, folder: Path) -> None:
@@ -85,11 +87,13 @@ def _check_same(job: Job, folder: Path) -> None:
         "recipe": asdict(job.recipe),
     }
     try:
-        saved = json.loads((folder / CONFIG).read_text())
-    except (OSError, ValueError) as error:
+        saved = json_in(folder / CONFIG)
+        if not isinstance(saved, dict):
+            raise GaitshiftError(f"must be a table, got {shortened(saved)}")
+    except GaitshiftError as error:
         raise GaitshiftError(f"{folder / CONFIG} cannot be read: {error}") from error
     for name, value in wanted.items():
-        if saved.get(name) != json.loads(json.dumps(value)):
+        if cast(dict[str, Any], saved).get(name) != json.loads(json.dumps(value)):
             raise GaitshiftError(
                 f"{folder} is a run with another {name}; give another --runs, or remove it"
             )

@@ -105,7 +105,7 @@ def draw_foot_heights(axes: Axes, log: Log, robot: int) -> None:
         columnspacing=1.2,
     )
     few_ticks(axes)
-    name_row(axes, "foot height at last touch, $h_i$ [cm]")
+    name_row(axes, "foot height at last touch, hᵢ [cm]")
 
 
 def draw_counter(axes: Axes, log: Log, robot: int) -> None:

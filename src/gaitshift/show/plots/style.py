@@ -74,6 +74,7 @@ _STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same words on every machine
     "font.size": 13,
     "text.color": INK,
+    "text.parse_math": False,  # names may hold "$"
     "figure.facecolor": PAPER,
     "axes.facecolor": PAPER,
     "axes.edgecolor": QUIET,

@@ -106,11 +106,9 @@ def _rows(log: Log, robot: int) -> list[dict[str, Any]]:
                 zero=True,
             ),
         ]
-    asked = log.sensed.need("forward_speed_command", "the page")[:, robot]
-    speeds = [
-        series("speed", log.truth.forward_speed[:, robot], "ink"),
-        series("command", asked, "#0072b2"),
-    ]
+    asked = log.sensed.forward_speed_command
+    speeds = [series("speed", log.truth.forward_speed[:, robot], "ink")]
+    speeds += [] if asked is None else [series("command", asked[:, robot], "#0072b2")]
     base, below = log.truth.base_position_w[:, robot, 2], ground_below(log, robot)
     levels = [series("ground", below, GROUND, fill=True), series("base", base, "ink")]
     rows += [

@@ -71,14 +71,14 @@ _SHIFT_HEAD = ("at", "where", "from", "to", "k")
 def _summary(log: Log, robot: int) -> str:
     fell = fall_time(log, robot)
     seconds = float(log.time[-1]) if fell is None else fell
-    way = float(
-        log.truth.base_position_w[np.searchsorted(log.time, seconds) - 1, robot, 0]
-        - log.truth.base_position_w[0, robot, 0]
-    )
+    last = max(int(np.searchsorted(log.time, seconds)) - 1, 0)
+    x = log.truth.base_position_w[:, robot, 0]
+    way = float(x[last] - x[0])
+    speed = way / seconds if seconds > 0 else 0.0
     count = len(shift_times(log, robot))
     shifts = "no shift of gait" if count == 0 else f"{count} shift{'s' * (count > 1)} of gait"
     end = "no fall" if fell is None else f"fall after {fell:.1f} s"
-    return f"{way:.1f} m in {seconds:.1f} s, {way / seconds:.2f} m/s, {shifts}, {end}"
+    return f"{way:.1f} m in {seconds:.1f} s, {speed:.2f} m/s, {shifts}, {end}"
 
 
 def _shifts(log: Log, robot: int) -> list[Row]:

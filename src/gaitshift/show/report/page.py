@@ -2,6 +2,7 @@
 
 import html
 import json
+import re
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -52,9 +53,8 @@ def write_page(
         "DATA": data,
         "SCRIPT": _read("player.js" if walks else "figures.js").replace("</script", "<\\/script"),
     }
-    text = _read("page.html")
-    for name, content in parts.items():
-        text = text.replace(f"@{name}@", content, 1)
+    # In one pass, so that a place in the text that is put in is not taken for one of the page.
+    text = re.sub(r"@([A-Z]+)@", lambda place: parts[place[1]], _read("page.html"))
     part = path.with_suffix(".part")
     part.write_text(text, encoding="utf-8")
     part.replace(path)
@@ -75,7 +75,8 @@ def _stage(names: Sequence[str]) -> str:
 
 
 def _json(name: str, value: Mapping[str, Any], mark: str = "") -> str:
-    text = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    # Without "<", no text in it ends the script or begins a comment.
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}"{mark}>{text}</script>\n'
 
 

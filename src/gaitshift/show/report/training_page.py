@@ -1,11 +1,11 @@
 """The page of a training: walks of its policies, learning curves, verdicts."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gaitshift.data import json_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
@@ -112,7 +112,7 @@ def _verdicts(path: Path) -> str:
 def _facts(path: Path) -> dict[str, str]:
     """Command, seed and recipe of a run."""
     try:
-        config = json.loads(path.read_text())
+        config: Any = json_in(path)
         recipe = config["recipe"]
         stages = [f"{stage['name']} {stage['iterations']}" for stage in recipe["stages"]]
         return {
@@ -122,5 +122,5 @@ def _facts(path: Path) -> dict[str, str]:
             "robots × steps per iteration": f"{recipe['robots']} × {recipe['steps']}",
             **{f"{name} version": str(one) for name, one in config["versions"].items()},
         }
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (GaitshiftError, KeyError, TypeError, AttributeError) as error:
         raise GaitshiftError(f"{path} cannot be read: {error}") from error

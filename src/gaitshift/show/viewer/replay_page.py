@@ -15,7 +15,7 @@ from gaitshift.show.plots.signals import check_robot, ground_of
 from gaitshift.show.viewer.charts import WINDOW, Charts, Tape
 from gaitshift.show.viewer.live import MOST_ROBOTS
 from gaitshift.show.viewer.scene import Scene
-from gaitshift.show.viewer.server import TICK, Clock
+from gaitshift.show.viewer.server import TICK, Clock, as_markdown
 
 _EVERY = round(TICK / CONTROL_PERIOD)
 """Entries of a log between two frames."""
@@ -77,7 +77,8 @@ class ReplayPage:
         panel.set_width(340)
         end = self._frames[-1].time
         n = self._frames[0].step.n
-        gui.add_markdown(f"{log.terrain} · {n} robot{'s' if n > 1 else ''} · {end:.1f} s")
+        ground = as_markdown(log.terrain)
+        gui.add_markdown(f"{ground} · {n} robot{'s' if n > 1 else ''} · {end:.1f} s")
         play = gui.add_button("pause")
         self._slider = gui.add_slider(
             "time [s]", min=0.0, max=end, step=TICK, initial_value=self._frames[0].time

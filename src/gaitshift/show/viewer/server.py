@@ -54,6 +54,11 @@ def serve(host: str, port: int) -> viser.ViserServer:
     return server
 
 
+def as_markdown(text: str) -> str:
+    """Text for a page's Markdown, in which no sign means anything but itself."""
+    return "".join(sign if sign.isalnum() or sign in " ,.@" else f"&#{ord(sign)};" for sign in text)
+
+
 def close(server: viser.ViserServer) -> None:
     """Closes the page."""
     with redirect_stdout(io.StringIO()):

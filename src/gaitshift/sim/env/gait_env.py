@@ -28,12 +28,12 @@ Observations = Float32[np.ndarray, "N D"]
 class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     """N robots that learn one gait: the product of a `World` and a `RewardMachine`.
 
-    An episode ends when the body touches the ground or the machine accepts, and is truncated after
-    `episode_steps` or at the border of the terrain. Robots restart in the same step
-    (`AutoresetMode.SAME_STEP`); the observation that ended an episode is in `info["final_obs"]`,
-    where `info["_final_obs"]` is true. `info["reward_terms"]` has each weighted term of R_walk,
-    `info["bonus"]` the machine's bonus, and `info["changed"]` whether the machine changed its
-    state.
+    An episode ends when the body touches the ground, the machine accepts or the simulation of the
+    robot diverges (`info["diverged"]`). It is truncated after `episode_steps` or at the border of
+    the terrain. Robots restart in the same step (`AutoresetMode.SAME_STEP`); the observation that
+    ended an episode is in `info["final_obs"]`, where `info["_final_obs"]` is true.
+    `info["reward_terms"]` has each weighted term of R_walk, `info["bonus"]` the machine's bonus,
+    and `info["changed"]` whether the machine changed its state.
     """
 
     def __init__(
@@ -127,8 +127,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             "changed": step.changed,
             "shows_stance": agreement == 1.0,
             "forward_speed": truth.forward_speed,
+            "diverged": truth.diverged,
         }
-        terminated = truth.body_contact | np.isin(step.state, self.machine.accepting)
+        terminated = (
+            truth.body_contact | truth.diverged | np.isin(step.state, self.machine.accepting)
+        )
         truncated = (self._age >= self.config.episode_steps) | self._left_terrain(truth)
         truncated &= ~terminated
         observation = self._next_observation(terminated | truncated, info)

@@ -51,7 +51,11 @@ class SingleGaitEnv(gym.Env[np.ndarray, np.ndarray]):
             float(reward[0]),
             bool(terminated[0]),
             bool(truncated[0]),
-            {"reward_terms": terms, "changed": bool(info["changed"][0])},
+            {
+                "reward_terms": terms,
+                "changed": bool(info["changed"][0]),
+                "diverged": bool(info["diverged"][0]),
+            },
         )
 
 

@@ -1,5 +1,6 @@
 """N robots on a terrain: joint targets in, `Proprioception` and `Privileged` out."""
 
+from gaitshift.sim.world.divergence import Divergence as Divergence
 from gaitshift.sim.world.push import PushConfig as PushConfig
 from gaitshift.sim.world.push import Pusher as Pusher
 from gaitshift.sim.world.world import Fidelity as Fidelity

@@ -1,6 +1,8 @@
 """N robots stepped on all cores: joint targets in, proprioception and privileged state out."""
 
+import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal, cast
 
 import mujoco
@@ -14,6 +16,7 @@ from gaitshift.robot.description import Gains, Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.sensors import POSE, TWIST, sense
 from gaitshift.sim.terrain import Terrain, to_unit_interval
+from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
 
 GROUND = "ground"
 """Name of the ground's geom."""
@@ -75,6 +78,20 @@ value of legged_gym."""
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are posed before they are set on the ground [m]; ours."""
 
+MOST_ANGLE = 20.0
+"""Greatest joint angle or joint target [rad]; ours: three turns, more than any joint has."""
+
+MOST_FORCE = 10_000.0
+"""Greatest force on a base [N]; ours: ten times the hardest push of `PushConfig`."""
+
+MOST_DISTANCE = 100_000.0
+"""Greatest coordinate of a base [m]; ours: positions still resolve 0.1 nm."""
+
+MOST_YAW = 1000.0
+"""Greatest yaw of a base [rad]; ours: more turns than a robot makes in a day."""
+
+_LOG = logging.getLogger(__name__)
+
 
 class World:
     """N robots, each alone on its terrain.
@@ -82,6 +99,9 @@ class World:
     Robots do not interact. With several terrains, robot i stands on terrain i mod K. Nothing moves
     between calls. `sensed` and `truth` always describe the present state, without delay (forces and
     torques are those of the last physics step, which led to this state).
+
+    A robot whose simulation diverges is set down in its stance where it was before the step, and
+    `truth.diverged` marks it after that step. The first `MOST_KEPT` of them are logged by number.
     """
 
     def __init__(
@@ -111,6 +131,11 @@ class World:
         self._gains = robot.gains_of(gains)
         self._threads = threads
         self._stance = robot.stance_angles
+        self._history = History(n)
+        self.divergences: list[Divergence] = []
+        """The first `MOST_KEPT` divergences, for replay; may be cleared."""
+        self._told = 0
+        self.terrains: tuple[Terrain, ...] = ()
         self.set_terrain(terrain, fidelity)
         self.place(np.arange(n), xy=np.zeros((n, 2)), yaw=np.zeros(n))
 
@@ -135,12 +160,23 @@ class World:
         if len(models) > 1:
             batch.set_models([models[i % len(models)] for i in range(self.n)])
         self._batch = batch
+        self._warned: Int[np.ndarray, "N 3"] = batch.warning[:, DIVERGED, 1]
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._ctrl, self._applied = batch.bind("ctrl"), batch.bind("qfrc_applied")
         self._sensors, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
         if state is not None:
-            self._qpos[:], self._qvel[:] = state
-            self._settle(np.arange(self.n))
+            self.set_state(*state)
+
+    def set_state(self, qpos: Float[np.ndarray, "N 19"], qvel: Float[np.ndarray, "N 18"]) -> None:
+        """Puts all robots into these states; joint targets are their present angles.
+
+        Raises:
+            GaitshiftError: a value is outside its range; the state is then unchanged.
+        """
+        _check("positions", "m or rad", qpos, MOST_DISTANCE)
+        _check("velocities", "m/s or rad/s", qvel, FASTEST)
+        self._qpos[:], self._qvel[:] = qpos, qvel
+        self._settle(np.arange(self.n))
 
     def place(
         self,
@@ -165,7 +201,20 @@ class World:
             joint_velocity: [rad/s]; 0 if not given, as are the velocities of the base.
             base_velocity_w: [m/s].
             base_angular_velocity_b: [rad/s].
+
+        Raises:
+            GaitshiftError: a value is outside its range, or `attitude` is no unit quaternion; the
+                state is then unchanged.
         """
+        _check("xy of robots", "m", xy, MOST_DISTANCE, ids)
+        _check("yaw of robots", "rad", yaw, MOST_YAW, ids)
+        if joint_position is not None:
+            _check("joint positions", "rad", joint_position, MOST_ANGLE, ids)
+        for values in (joint_velocity, base_velocity_w, base_angular_velocity_b):
+            if values is not None:
+                _check("velocities", "m/s or rad/s", values, FASTEST, ids)
+        if attitude is not None:
+            _check_unit(attitude, ids)
         qpos = np.zeros((len(ids), POSE + 12))
         qpos[:, :2] = xy
         qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
@@ -189,7 +238,12 @@ class World:
         self._settle(ids)
 
     def push(self, force_w: Float[np.ndarray, "N 3"]) -> None:
-        """Forces on the base origins, world frame [N], until the next call or `place`."""
+        """Forces on the base origins, world frame [N], until the next call or `place`.
+
+        Raises:
+            GaitshiftError: a force is outside ± `MOST_FORCE`; the state is then unchanged.
+        """
+        _check("forces", "N", force_w, MOST_FORCE)
         self._applied[:, :3] = force_w
 
     def step(self, target: Float[np.ndarray, "N 12"]) -> tuple[Proprioception, Privileged]:
@@ -198,22 +252,46 @@ class World:
         Returns `sensed` and `truth`.
 
         Raises:
-            GaitshiftError: a target is not finite; the state is then unchanged.
+            GaitshiftError: a target is outside ± `MOST_ANGLE`; the state is then unchanged.
         """
-        if not np.isfinite(target).all():
-            bad = int(np.flatnonzero(~np.isfinite(target).all(axis=1))[0])
-            joint = self.robot.joint_names[int(np.flatnonzero(~np.isfinite(target[bad]))[0])]
-            raise GaitshiftError(
-                f"joint targets must be numbers, got NaN or infinity for {joint} of robot {bad}"
-            )
+        _check("joint targets", "rad", target, MOST_ANGLE, names=self.robot.joint_names)
+        self._history.add(self._qpos, self._qvel)
         self._ctrl[:] = target
         self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
-        self._measure()
+        if self._warned.any() or not np.abs(self._qvel).max() <= FASTEST:  # true for NaN
+            in_range = np.abs(self._qvel).max(axis=1) <= FASTEST
+            self._restart(np.flatnonzero(self._warned.any(axis=1) | ~in_range))
+        else:
+            self._measure()
         return self.sensed, self.truth
 
     def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
         """Copies of qpos and qvel."""
         return self._qpos.copy(), self._qvel.copy()
+
+    def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
+        """Sets diverged robots down where they were before the step, and keeps their last second.
+
+        In `truth`, which then describes the restarted robots, `diverged` is true for them.
+        """
+        for robot in map(int, ids):
+            steps = self._history.steps_of(robot)
+            if self._told < MOST_KEPT:
+                self._told += 1
+                _LOG.warning(
+                    "robot %d: its simulation diverged after %.2f s; it counts as failed and is "
+                    "restarted",
+                    robot,
+                    steps * CONTROL_PERIOD,
+                )
+            if len(self.divergences) < MOST_KEPT:
+                terrain = self.terrains[robot % len(self.terrains)]
+                self.divergences.append(self._history.divergence(robot, terrain))
+        before = self.truth.base_position_w[ids, :2], self.sensed.yaw[ids]
+        self.place(ids, xy=np.clip(before[0], -MOST_DISTANCE, MOST_DISTANCE), yaw=before[1])
+        mask = np.zeros(self.n, dtype=bool)
+        mask[ids] = True
+        self.truth = replace(self.truth, diverged=mask)
 
     def _measure(self) -> None:
         """Updates `truth` and `sensed`."""
@@ -230,6 +308,7 @@ class World:
             foot_force=force,
             clearance=feet[..., 2] - self._ground(feet[..., :2], None),
             body_contact=sensors[:, 28] > 0.0,
+            diverged=np.zeros(self.n, dtype=bool),
         )
         self.sensed = sense(
             self.truth,
@@ -263,6 +342,7 @@ class World:
         """Updates every measured quantity of these robots."""
         self._ctrl[ids] = self._qpos[ids, POSE:]
         self._applied[ids] = 0.0
+        self._history.forget(ids)
         self._batch.forward(ids=ids)
         self._measure()
 
@@ -276,3 +356,34 @@ class World:
         self.terrains = terrains[: self.n]
         qpos[:, 2] += (self._ground(feet, None) - before).max(axis=1)
         return qpos, qvel
+
+
+def _check(
+    what: str,
+    unit: str,
+    values: np.ndarray,
+    most: float,
+    ids: Int[np.ndarray, " K"] | None = None,
+    names: Sequence[str] = (),
+) -> None:
+    """`GaitshiftError` unless all values are within ± `most`, one row a robot (`ids`)."""
+    if (np.abs(values) <= most).all():
+        return
+    row, *column = np.argwhere(~(np.abs(values) <= most))[0].tolist()
+    robot = row if ids is None else int(ids[row])
+    part = f"{names[column[0]]} of " if names else ""
+    value = float(values[(row, *column)])
+    raise GaitshiftError(
+        f"{what} must be {-most:g} to {most:g} {unit}, got {value:g} for {part}robot {robot}"
+    )
+
+
+def _check_unit(attitude: Float[np.ndarray, "K 4"], ids: Int[np.ndarray, " K"]) -> None:
+    """`GaitshiftError` unless these are unit quaternions, one row a robot (`ids`)."""
+    length = np.linalg.norm(attitude, axis=1)
+    wrong = np.flatnonzero(~(np.abs(length - 1.0) <= 1e-3))
+    if wrong.size:
+        raise GaitshiftError(
+            f"attitudes must be unit quaternions, got length {length[wrong[0]]:g} for robot "
+            f"{ids[wrong[0]]}"
+        )
