@@ -5,30 +5,36 @@ import os
 import select
 import sys
 from contextlib import redirect_stderr
+from dataclasses import make_dataclass
 from importlib import import_module
 from typing import Annotated, Any, Protocol, Union, cast, runtime_checkable
-
-import tyro
 
 from gaitshift.cli.output import say
 from gaitshift.errors import GaitshiftError
 
-COMMANDS = (
-    "demo",
-    "gaits",
-    "train",
-    "evaluate",
-    "record",
-    "identify",
-    "reproduce",
-    "study",
-    "transitions",
-    "report",
-    "view",
-    "bench",
-)
-"""The subcommands in the order of `--help`. A new one is a line here and a file of its name beside
-this one, with a dataclass of its name: `time-to-gait` is `TimeToGait` in `time_to_gait.py`."""
+COMMANDS = {
+    "demo": "Simulate a robot that crosses flat and rough ground and shifts its gait by itself.",
+    "gaits": "List the gaits, print the machine of one as a Mermaid diagram, or draw the machines.",
+    "train": "Train a gait with PPO: flat ground first, then rough ground with pushes.",
+    "evaluate": "Evaluate a policy on many robots, without exploration noise.",
+    "record": "Record gaits on the standard courses: flat, slopes, steps, stairs, pebbles, noise.",
+    "identify": "Find α and β of a shift condition from logs, and judge them on others.",
+    "reproduce": "Reproduce the paper: train trot, bound and pace with its recipe on five seeds, "
+    "and ablations.",
+    "study": "Compare robots on rough ground: in either gait alone, and with shifts by each "
+    "condition.",
+    "transitions": "Test gait shifts of every ordered pair of gaits at random phases of the "
+    "stride.",
+    "report": "Make one self-contained page of a log or of a training run.",
+    "view": "Show robots in the browser: a live simulation with controls, or a log.",
+    "bench": "Measure speed.",
+}
+"""The subcommands in the order of `--help`, with the first paragraph of their own help.
+
+A new one is a line here and a file of its name beside this one, with a dataclass of its name:
+`time-to-gait` is `TimeToGait` in `time_to_gait.py`. Only the file of the subcommand that runs is
+imported.
+"""
 
 
 @runtime_checkable
@@ -49,7 +55,7 @@ def main(arguments: list[str] | None = None) -> None:
     A reader that closes the pipe (`| head`) is not an error, and causes no message.
     """
     try:
-        _parse(arguments).run()
+        _parse(sys.argv[1:] if arguments is None else arguments).run()
         sys.stdout.flush()  # here, where the error of a closed pipe can be caught
     except GaitshiftError as error:
         say(f"gaitshift: {error}")
@@ -75,20 +81,29 @@ def _nobody_reads() -> bool:
     return True
 
 
-def _parse(arguments: list[str] | None) -> Command:
+def _parse(arguments: list[str]) -> Command:
     """The command in the arguments; `GaitshiftError` where they cannot be read."""
+    import tyro  # slow to import
+
+    named = arguments[0] if arguments else ""
     said = io.StringIO()
     try:
         with redirect_stderr(said):
+            if named in COMMANDS:
+                return tyro.cli(
+                    _command(named),
+                    prog=f"gaitshift {named}",
+                    args=arguments[1:],
+                    config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
+                )
             return tyro.cli(
-                cast(Any, Union)[tuple(_subcommand(name) for name in COMMANDS)],
+                _any_command(),
                 prog="gaitshift",
                 description=(
                     "Train quadruped gaits described by reward machines, and let the robot shift "
                     "between them by itself."
                 ),
-                args=arguments,
-                config=(tyro.conf.OmitArgPrefixes, tyro.conf.FlagCreatePairsOff),
+                args=arguments[:1],
             )
     except SystemExit as end:
         if end.code:
@@ -96,10 +111,22 @@ def _parse(arguments: list[str] | None) -> Command:
         raise
 
 
-def _subcommand(name: str) -> Any:
+def _command(name: str) -> type[Command]:
+    """The dataclass of a subcommand."""
     module = import_module(f"gaitshift.cli.{name.replace('-', '_')}")
-    made = getattr(module, name.title().replace("-", ""))
-    return Annotated[made, tyro.conf.subcommand(name)]
+    return getattr(module, name.title().replace("-", ""))
+
+
+def _any_command() -> Any:
+    """All subcommands with their help and without their options: for `--help`, and for errors."""
+    from tyro.conf import subcommand
+
+    return cast(Any, Union)[
+        tuple(
+            Annotated[make_dataclass(name, ()), subcommand(name, description=help)]
+            for name, help in COMMANDS.items()
+        )
+    ]
 
 
 def _first_part(box: str) -> str:
