@@ -78,7 +78,7 @@ def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = Non
 def append(path: Path, row: Row) -> None:
     """Adds a row to a CSV file; a new file gets a header first."""
     new = not path.exists()
-    with path.open("a", newline="") as file:
+    with path.open("a", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, row.keys(), lineterminator=_GROWING_LINE_END)
         if new:
             lines.writeheader()
@@ -147,7 +147,7 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
     """Names of the columns, and rows: missing cells are None, surplus cells have the key None."""
     try:
-        with path.open(newline="") as file:
+        with path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             columns, rows = tuple(reader.fieldnames or ()), list(reader)
     except OSError as error:
@@ -163,7 +163,7 @@ def _is_whole(row: Mapping[str, str]) -> bool:
 
 def _write(path: Path, rows: Sequence[Row], columns: tuple[str, ...], line_end: str) -> None:
     part = path.with_suffix(".part")
-    with part.open("w", newline="") as file:
+    with part.open("w", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, columns, lineterminator=line_end)
         lines.writeheader()
         lines.writerows(rows)

@@ -3,14 +3,18 @@
 import io
 import os
 import select
+import signal
 import sys
-from contextlib import redirect_stderr
+from collections.abc import Generator
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import make_dataclass
 from importlib import import_module
+from itertools import groupby
 from typing import Annotated, Any, Protocol, Union, cast, runtime_checkable
 
 from gaitshift.cli.output import say
 from gaitshift.errors import GaitshiftError
+from gaitshift.show import opengl
 
 COMMANDS = {
     "demo": "Simulate a robot that crosses flat and rough ground and shifts its gait by itself.",
@@ -45,40 +49,81 @@ class Command(Protocol):
         """Runs the command; `GaitshiftError` for bad input."""
 
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells have it."""
+class Terminated(KeyboardInterrupt):
+    """SIGTERM: the command ends as after Ctrl-C."""
+
+    exit_code = 128 + signal.SIGTERM
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Runs the command line; ends the process with 0, 2 (bad input) or 130 (Ctrl-C).
+def run(arguments: list[str]) -> None:
+    """Runs the subcommand; ends the process with 2 after an error that a user can cause.
 
-    A reader that closes the pipe (`| head`) is not an error, and causes no message.
+    Raises:
+        KeyboardInterrupt: Ctrl-C; `Terminated` after SIGTERM.
     """
+    _prepare_streams()
     try:
-        _parse(sys.argv[1:] if arguments is None else arguments).run()
-        sys.stdout.flush()  # here, where the error of a closed pipe can be caught
+        with _sigterm_raises(), opengl.postponed():
+            _run(arguments)
     except GaitshiftError as error:
         say(f"gaitshift: {error}")
         sys.exit(2)
-    except KeyboardInterrupt:
-        say("gaitshift: interrupted")
-        sys.exit(INTERRUPTED)
     except OSError as error:
         if isinstance(error, BrokenPipeError) and _nobody_reads():
+            _discard_output()
             sys.exit(0)
         where = "" if error.filename is None else f"{error.filename}: "
         say(f"gaitshift: {where}{error.strerror or error}")
+        _discard_output()
         sys.exit(2)
 
 
+def _run(arguments: list[str]) -> None:
+    try:
+        _parse(arguments).run()
+    except SystemExit:  # after `--help`
+        sys.stdout.flush()
+        raise
+    sys.stdout.flush()  # here, where the error of a closed pipe can be caught
+
+
+def _prepare_streams() -> None:
+    """Standard streams that are open and encode any text.
+
+    A closed one (`>&-`) becomes the null device: otherwise the next file gets its number, and what
+    is printed. A character that is not in the encoding of the terminal is written as its number.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        stream = getattr(sys, name)
+        if stream is None:
+            null = os.open(os.devnull, os.O_RDWR)  # the lowest free number, which is its own
+            setattr(sys, name, os.fdopen(null, mode, encoding="utf-8"))
+        elif mode == "w" and isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+@contextmanager
+def _sigterm_raises() -> Generator[None]:
+    def terminate(*_: object) -> None:
+        raise Terminated("terminated")
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def _nobody_reads() -> bool:
-    """Whether stdout has no reader; if so, the rest of the output is discarded."""
+    """Whether stdout has no reader."""
     look = select.poll()
     look.register(sys.stdout.fileno(), 0)  # errors and hang-ups are always reported
-    if not look.poll(0):
-        return False
+    return bool(look.poll(0))
+
+
+def _discard_output() -> None:
+    """Discards the rest of the output, which Python would write at its end, and fail again."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    return True
 
 
 def _parse(arguments: list[str]) -> Command:
@@ -130,7 +175,11 @@ def _any_command() -> Any:
 
 
 def _first_part(box: str) -> str:
-    """The text of a tyro box above its first rule, as one line."""
+    """The text of a tyro box between its title and its next rule, as one line."""
     lines = [line.strip("│ ") for line in box.splitlines()[1:]]
-    rule = next((i for i, line in enumerate(lines) if line.startswith(("─", "╰"))), len(lines))
-    return f"{' '.join(line for line in lines[:rule] if line)}; see --help"
+    parts = (list(part) for is_rule, part in groupby(lines, _is_rule) if not is_rule)
+    return f"{' '.join(line for line in next(parts, []) if line)}; see --help"
+
+
+def _is_rule(line: str) -> bool:
+    return bool(line) and set(line) <= set("─╰╯-")

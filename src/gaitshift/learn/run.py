@@ -108,7 +108,7 @@ class Run:
         if robot != ANYMAL_B:
             config["robot"] = to_dict(robot)
         # First, so that a folder that a kill left unfinished still shows what it is.
-        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
+        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n", encoding="utf-8")
         (folder / CHECKPOINTS).mkdir(exist_ok=True)
         run._save_checkpoint()
         return run
@@ -117,7 +117,7 @@ class Run:
     def resume(cls, folder: Path) -> "Run":
         """The run of a folder, as it was at its last checkpoint."""
         try:
-            config = json.loads((folder / CONFIG).read_text())
+            config = json.loads((folder / CONFIG).read_text(encoding="utf-8"))
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
             robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B

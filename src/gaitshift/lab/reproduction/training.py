@@ -46,7 +46,7 @@ def train(job: Job, folder: Path) -> None:
     try:
         run.train()
     except DivergedError as error:
-        (folder / FAILED).write_text(f"{error}\n")
+        (folder / FAILED).write_text(f"{error}\n", encoding="utf-8")
 
 
 def iterations_done(folder: Path) -> int:
@@ -85,7 +85,7 @@ def _check_same(job: Job, folder: Path) -> None:
         "recipe": asdict(job.recipe),
     }
     try:
-        saved = json.loads((folder / CONFIG).read_text())
+        saved = json.loads((folder / CONFIG).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise GaitshiftError(f"{folder / CONFIG} cannot be read: {error}") from error
     for name, value in wanted.items():

@@ -112,7 +112,7 @@ def _verdicts(path: Path) -> str:
 def _facts(path: Path) -> dict[str, str]:
     """Command, seed and recipe of a run."""
     try:
-        config = json.loads(path.read_text())
+        config = json.loads(path.read_text(encoding="utf-8"))
         recipe = config["recipe"]
         stages = [f"{stage['name']} {stage['iterations']}" for stage in recipe["stages"]]
         return {
