@@ -63,18 +63,18 @@ def run(arguments: list[str]) -> None:
     """
     _prepare_streams()
     try:
-        with _sigterm_raises(), opengl.postponed():
+        with _stoppable(), opengl.postponed():
             _run(arguments)
     except GaitshiftError as error:
         say(f"gaitshift: {error}")
         sys.exit(2)
     except OSError as error:
         if isinstance(error, BrokenPipeError) and _nobody_reads():
-            _discard_output()
+            _end_output()
             sys.exit(0)
         where = "" if error.filename is None else f"{error.filename}: "
         say(f"gaitshift: {where}{error.strerror or error}")
-        _discard_output()
+        _end_output()
         sys.exit(2)
 
 
@@ -103,15 +103,30 @@ def _prepare_streams() -> None:
 
 
 @contextmanager
-def _sigterm_raises() -> Generator[None]:
-    def terminate(*_: object) -> None:
-        raise Terminated("terminated")
+def _stoppable() -> Generator[None]:
+    """Ctrl-C and SIGTERM raise, and end the command whatever becomes of their exception.
 
-    before = signal.signal(signal.SIGTERM, terminate)
+    A compiled module that is stopped while it is imported raises an `ImportError` in its place.
+    """
+    stops: list[KeyboardInterrupt] = []
+
+    def stop(number: int, _: object) -> None:
+        stops.append(KeyboardInterrupt() if number == signal.SIGINT else Terminated("terminated"))
+        raise stops[-1]
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:  # as of a shell's background job
+            signal.signal(number, stop)
     try:
         yield
+    except Exception:
+        if stops:
+            raise stops[0] from None
+        raise
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _nobody_reads() -> bool:
@@ -121,9 +136,12 @@ def _nobody_reads() -> bool:
     return bool(look.poll(0))
 
 
-def _discard_output() -> None:
-    """Discards the rest of the output, which Python would write at its end, and fail again."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def _end_output() -> None:
+    """Writes the rest of the output; discards it where Python, at its end, would fail again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parse(arguments: list[str]) -> Command:
@@ -178,7 +196,7 @@ def _first_part(box: str) -> str:
     """The text of a tyro box between its title and its next rule, as one line."""
     lines = [line.strip("│ ") for line in box.splitlines()[1:]]
     parts = (list(part) for is_rule, part in groupby(lines, _is_rule) if not is_rule)
-    return f"{' '.join(line for line in next(parts, []) if line)}; see --help"
+    return f"{' '.join(line for line in next(parts, list[str]()) if line)}; see --help"
 
 
 def _is_rule(line: str) -> bool:
