@@ -32,7 +32,7 @@ def write_example(path: Path) -> None:
         columns[f"foot_{name}_x"] = (0.35 if leg < 2 else -0.35) + sweep
         columns[f"foot_{name}_y"] = (0.2 if leg % 2 == 0 else -0.2) + 0.0 * time
         columns[f"foot_{name}_z"] = -0.5 + np.where(phase < 0.5, ground, 0.1)
-    with path.open("w", newline="") as file:
+    with path.open("w", newline="", encoding="utf-8") as file:
         rows = csv.writer(file)
         rows.writerow(columns)
         rows.writerows(zip(*(values.round(4).tolist() for values in columns.values()), strict=True))

@@ -279,7 +279,9 @@ def test_a_controller_is_one_file_and_one_line(copy):
 
 def test_a_command_is_one_file_and_one_line(copy):
     copy.add_file("cli/greet_gait.py", GREET)
-    copy.add_line("cli/app.py", '    "bench",\n', '    "greet-gait",')
+    copy.add_line(
+        "cli/app.py", '    "bench": "Measure speed.",\n', '    "greet-gait": "Greet a gait.",'
+    )
     assert "Greet a gait." in copy.python("-m", "gaitshift", "greet-gait", "--help")
     assert copy.python("-m", "gaitshift", "greet-gait", "--gait", "pace") == "hello, pace\n"
 

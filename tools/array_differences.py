@@ -26,7 +26,7 @@ def read_log(path: Path) -> Arrays:
 
 def read_table(path: Path) -> Arrays:
     """Columns of a CSV file, as text."""
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         lines = csv.DictReader(file)
         rows = list(lines)
     return {name: np.array([row[name] for row in rows], str) for name in lines.fieldnames or ()}
@@ -44,7 +44,7 @@ def read_json(path: Path) -> Arrays:
         else:
             found[name] = np.array(json.dumps(value))
 
-    walk(json.loads(path.read_text()), "")
+    walk(json.loads(path.read_text(encoding="utf-8")), "")
     return found
 
 
@@ -61,7 +61,10 @@ READERS: dict[str, tuple[str, Callable[[Path], Arrays]]] = {
     ".csv": ("columns", read_table),
     ".json": ("fields", read_json),
     ".onnx": ("initialisers", read_network),
-    ".md": ("text", lambda path: {"lines": np.array(path.read_text().splitlines(), str)}),
+    ".md": (
+        "text",
+        lambda path: {"lines": np.array(path.read_text(encoding="utf-8").splitlines(), str)},
+    ),
 }
 
 

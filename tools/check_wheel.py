@@ -105,6 +105,7 @@ def run(command: list[str | Path], cwd: Path = ROOT) -> None:
         stderr=subprocess.STDOUT,
         text=True,
         check=False,
+        encoding="utf-8",
     )
     if done.returncode:
         sys.exit(f"{done.stdout}failed: {' '.join(str(part) for part in command)}")

@@ -86,7 +86,9 @@ class Checkout:
         self.folder = out.resolve() / (commit if self.clean else changed)
 
     def _git(self, *words: str) -> str:
-        done = subprocess.run(["git", "-C", self.path, *words], capture_output=True, text=True)
+        done = subprocess.run(
+            ["git", "-C", self.path, *words], capture_output=True, text=True, encoding="utf-8"
+        )
         return done.stdout.strip()
 
     def python(self, *words: str, cwd: Path) -> str:
@@ -98,6 +100,7 @@ class Checkout:
             env=os.environ | paths,
             capture_output=True,
             text=True,
+            encoding="utf-8",
         )
         if done.returncode:
             last = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
@@ -112,7 +115,7 @@ class Checkout:
         versions = {package: version(package) for package in packages}
         stamp = json.dumps({"commands": commands, "python": sys.executable, **versions})
         done = folder / "done.json"
-        if self.clean and done.is_file() and done.read_text() == stamp:
+        if self.clean and done.is_file() and done.read_text(encoding="utf-8") == stamp:
             return folder
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
@@ -122,8 +125,8 @@ class Checkout:
         for words in commands:
             print(f"{self.path}: gaitshift {' '.join(words)}", file=sys.stderr, flush=True)
             printed = self.python("-m", "gaitshift", *words, cwd=folder)
-            (folder / f"{words[0]}.json").write_text(printed)
-        done.write_text(stamp)
+            (folder / f"{words[0]}.json").write_text(printed, encoding="utf-8")
+        done.write_text(stamp, encoding="utf-8")
         return folder
 
 

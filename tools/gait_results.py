@@ -69,7 +69,9 @@ Speeds are tried at the gait's nominal stride frequency, and frequencies at its 
 def page() -> str:
     """The whole page."""
     names = [*FIRST_GAITS, *(name for name in policy.shipped() if name not in FIRST_GAITS)]
-    records = {name: json.loads((POLICIES / f"{name}.json").read_text()) for name in names}
+    records = {
+        name: json.loads((POLICIES / f"{name}.json").read_text(encoding="utf-8")) for name in names
+    }
     size = SIZES["all"]
     head = HEAD.format(
         clean=sum(_is_clean(name, record) for name, record in records.items()),
@@ -94,7 +96,7 @@ def _training(records: dict[str, Any]) -> str:
     """One row a gait: its seed, and the iterations of each stage by its curve."""
     rows = []
     for name, record in records.items():
-        with (POLICIES / f"{name}.csv").open(newline="") as file:
+        with (POLICIES / f"{name}.csv").open(newline="", encoding="utf-8") as file:
             counts = Counter(row["stage"] for row in csv.DictReader(file))
         stages = ", ".join(f"{stage} {EVERY * count}" for stage, count in counts.items())
         rows.append((name, str(record["seed"]), str(record["iterations"]), stages))
@@ -216,5 +218,5 @@ def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(page())
+    PAGE.write_text(page(), encoding="utf-8")
     print(f"written: {PAGE}")

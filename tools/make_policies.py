@@ -19,7 +19,7 @@ RUNS = Path("runs")
 
 def commands(gait: str) -> tuple[Path, list[str]]:
     """The folder of the run, and the words of the command that trains the shipped policy."""
-    record = json.loads(policy.record_file(gait).read_text())
+    record = json.loads(policy.record_file(gait).read_text(encoding="utf-8"))
     preset, seed = record["preset"], str(record["seed"])
     folder = RUNS / f"{gait}-{seed}"
     if (folder / "config.json").is_file():

@@ -137,7 +137,7 @@ def make(page: str) -> None:
     if page in IDENTIFIED and hover.stat().st_size > LARGEST:
         hover.unlink()
         text = RESULTS / page / "README.md"
-        text.write_text(text.read_text().replace(ITS_LINK, ""))
+        text.write_text(text.read_text(encoding="utf-8").replace(ITS_LINK, ""), encoding="utf-8")
 
 
 def main() -> None:

@@ -64,7 +64,9 @@ def judged(loaded: policy.Policy, trials: str) -> dict[str, Any]:
 
 def write_record(name: str, record: dict[str, Any]) -> None:
     """Writes down where a shipped policy comes from and what it does."""
-    (POLICIES / f"{name}.json").write_text(json.dumps(_rounded(record), indent=1) + "\n")
+    (POLICIES / f"{name}.json").write_text(
+        json.dumps(_rounded(record), indent=1) + "\n", encoding="utf-8"
+    )
 
 
 def _rounded(value: object) -> object:
@@ -85,4 +87,4 @@ if __name__ == "__main__":
             judge_again(run, options.trials)
         else:
             ship(Path(run), options.trials)
-    PAGE.write_text(page())
+    PAGE.write_text(page(), encoding="utf-8")

@@ -272,7 +272,7 @@ def _mean(figures: list[dict[str, Any]], name: str, of: Callable[[Any], float]) 
 
 def _write(name: str, text: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) -> Path:
     path = RESULTS / name
-    path.write_text(f"{text}\n{markdown(columns, rows)}\n")
+    path.write_text(f"{text}\n{markdown(columns, rows)}\n", encoding="utf-8")
     return path
 
 

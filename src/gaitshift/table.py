@@ -81,7 +81,7 @@ def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = Non
 def append(path: Path, row: Row) -> None:
     """Adds a row to a CSV file; a new file gets a header first."""
     new = not path.exists()
-    with path.open("a", newline="") as file:
+    with path.open("a", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, row.keys(), lineterminator=_GROWING_LINE_END)
         if new:
             lines.writeheader()
@@ -154,7 +154,7 @@ def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
             f"{path} must have {MOST_BYTES >> 20} MB or less, got {path.stat().st_size >> 20} MB"
         )
     try:
-        with path.open(newline="") as file:
+        with path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
             columns, rows = tuple(reader.fieldnames or ()), list(reader)
     except OSError as error:
@@ -170,7 +170,7 @@ def _is_whole(row: Mapping[str, str]) -> bool:
 
 def _write(path: Path, rows: Sequence[Row], columns: tuple[str, ...], line_end: str) -> None:
     part = path.with_suffix(".part")
-    with part.open("w", newline="") as file:
+    with part.open("w", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, columns, lineterminator=line_end)
         lines.writeheader()
         lines.writerows(rows)

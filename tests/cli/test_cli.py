@@ -40,6 +40,11 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["train", "trot", "--seed", "-1"], "seed must be 0 or larger, got -1"),
         (["train", "--resume", "nowhere"], "not a training run"),
         (["train", "trot", "--resume", "nowhere"], "must not be given with --resume"),
+        (
+            ["train", "--resume", "nowhere", "--iterations", "4"],
+            "--iterations must not be given with --resume",
+        ),
+        (["train", "--resume", "nowhere", "--seed", "1"], "--seed must not be given with --resume"),
         (["evaluate", "canter"], "policy must be one of "),
         (["evaluate", "none.onnx"], "no policy file none.onnx"),
         (["evaluate", "trot", "--terrain", "lava"], "unknown terrain 'lava'"),
@@ -59,6 +64,11 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
             ["demo", "--gaits", "trot,bound", "--at", "1,x"],
             "at must be numbers separated by commas, such as 2,5,8, got '1,x'",
         ),
+        (
+            ["demo", "--gaits", "trot,bound", "--at", "nan"],
+            "at must give rising times above 0 and up to 3600 s, got [nan]",
+        ),
+        (["demo", "--gaits", "trot,bound", "--at", "1e400"], "up to 3600 s, got [inf]"),
         (["demo", "--alpha", "-1"], "alpha"),
         (["demo", "--rough-gait", "trot"], "must differ, got 'trot'"),
         (["bench", "--robots", "0"], "robots must be 1 to 65536"),
@@ -172,9 +182,10 @@ def test_a_full_disk_is_one_line_with_the_file(
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_reader_that_has_seen_enough_is_no_fault(unbuffered: str) -> None:
+@pytest.mark.parametrize("arguments", [["gaits", "--json"], ["--help"]])
+def test_a_reader_that_has_seen_enough_is_no_fault(arguments: list[str], unbuffered: str) -> None:
     """Its end of the pipe is closed before anything is written."""
-    command = [sys.executable, "-m", "gaitshift", "gaits", "--json"]
+    command = [sys.executable, "-m", "gaitshift", *arguments]
     environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, text=True
@@ -287,24 +298,28 @@ iterate = Run.iterate
 def interrupted(self):
     row = iterate(self)
     if row["iteration"] == 28:
-        os.kill(os.getpid(), signal.SIGINT)
+        os.kill(os.getpid(), getattr(signal, sys.argv[1]))
     return row
 Run.iterate = interrupted
-main(sys.argv[1:])
+main(sys.argv[2:])
 """
-"""A training that gets Ctrl-C after iteration 28, on however slow a machine."""
+"""A training that gets a signal after iteration 28, on however slow a machine."""
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_a_run_that_goes_on(tmp_path: Path) -> None:
-    """Interrupted in a training: exit code 130, no traceback, and --resume ends it."""
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_a_signal_leaves_a_run_that_goes_on(name: str, code: int, tmp_path: Path) -> None:
+    """Stopped in a training: the signal's exit code, no traceback, and --resume ends it."""
     out = tmp_path / "run"
     size = ["--robots", "8", "--iterations", "40", "--threads", "1"]
     arguments = ["train", "trot", *size, "--out", str(out)]
     done = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED, *arguments], capture_output=True, text=True, check=False
+        [sys.executable, "-c", INTERRUPTED, name, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    assert done.returncode == 130
+    assert done.returncode == code
     assert "Traceback" not in done.stderr
     assert f"--resume {out}" in done.stderr
     assert policy.load(out / "policy.onnx").gait == "trot"

@@ -14,6 +14,7 @@ from PIL import ImageColor
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
+from gaitshift.show import opengl
 from gaitshift.show.plots import gait_colours
 from gaitshift.show.video import VideoUnavailable, render
 from gaitshift.show.video.canvas import Ball, Camera, Canvas, follow
@@ -327,6 +328,20 @@ def test_without_opengl_one_line_says_what_to_install(environment):
     assert said.startswith("unavailable: videos need OpenGL (")
     assert said.endswith("apt-get install libegl1 libgl1")
     assert "\n" not in said
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the backends are those of Linux")
+def test_a_backend_that_does_not_exist_is_named_with_those_that_do(monkeypatch):
+    """MuJoCo itself cannot be imported with such a value, so that it sees another."""
+    monkeypatch.delenv(opengl.CHOICE, raising=False)
+    monkeypatch.setenv("MUJOCO_GL", "nonsense")
+    with opengl.postponed():
+        assert os.environ["MUJOCO_GL"] == "disable"
+        with pytest.raises(RuntimeError) as error:
+            opengl.open_context(64, 64)
+    assert "egl, glfw, osmesa, disable, got 'nonsense'" in str(error.value)
+    assert os.environ["MUJOCO_GL"] == "nonsense"
+    assert opengl.CHOICE not in os.environ
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL draws without a screen on Linux alone")

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import time
+import urllib.request
 
 import numpy as np
 import pytest
@@ -53,6 +54,25 @@ def test_a_port_that_is_taken_is_named(capsys):
             main(["view", "--port", str(port)])
     assert end.value.code == 2
     assert f"cannot listen on 127.0.0.1:{port}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("host", "opens"), [("0.0.0.0", "127.0.0.1"), ("::1", "[::1]"), ("::", "[::1]")]
+)
+def test_the_address_that_is_printed_opens(host, opens):
+    port = free_port()
+    command = [sys.executable, "-m", "gaitshift", "view", "--host", host, "--port", str(port)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        address = process.stdout.readline().split()[1]
+        try:
+            assert address == f"http://{opens}:{port}"
+            with urllib.request.urlopen(address, timeout=PATIENCE) as page:
+                assert page.status == 200
+        finally:
+            process.send_signal(signal.SIGINT)
+        assert process.wait(PATIENCE) == 0
 
 
 # In a browser -------------------------------------------------------------------------------------

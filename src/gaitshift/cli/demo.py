@@ -78,7 +78,7 @@ class Demo(RobotOptions, DemoConfig):
         summary = self._summary(summaries)
         self.out.mkdir(parents=True, exist_ok=True)
         log.save(self.out / LOG)
-        (self.out / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n")
+        (self.out / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
         self._draw(log)
         written = [SUMMARY, PICTURE, LOG]
         if self.video and self._render(log):

@@ -7,11 +7,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-
 from gaitshift.errors import GaitshiftError
 
 Report = Callable[[int, int], None]
@@ -36,6 +31,10 @@ def emit_json(data: Any) -> None:
 
 def emit_table(title: str, rows: Sequence[tuple[str, ...]]) -> None:
     """A short table on stdout, folded to the width of a terminal, unfolded elsewhere."""
+    from rich.console import Console  # slow to import, and not every command prints a table
+    from rich.markup import escape
+    from rich.table import Table
+
     table = Table(title=title, show_header=False, title_justify="left")
     table.add_column(no_wrap=True)  # names; only the other columns are folded
     for _ in range(max(map(len, rows), default=1) - 1):
@@ -48,6 +47,9 @@ def emit_table(title: str, rows: Sequence[tuple[str, ...]]) -> None:
 @contextmanager
 def progress(label: str) -> Generator[Report]:
     """A progress bar on stderr, with the time left; nothing where stderr is not a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -106,7 +106,7 @@ class Study(RobotOptions):
 
         crossings_figure(rows, self.out / PICTURE)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
-        (self.out / README).write_text(page(rows, command))
+        (self.out / README).write_text(page(rows, command), encoding="utf-8")
         if self.json:
             emit_json({"out": str(self.out), "crossings": rows})
         else:

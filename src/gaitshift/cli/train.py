@@ -3,7 +3,7 @@
 import shlex
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from gaitshift.cli.output import emit_json, say
+from gaitshift.cli.output import emit_json
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
@@ -62,9 +62,9 @@ class Train(RobotOption):
         try:
             with bar:
                 path = run.train(bar, bar.judge, bar.keep)
-        except KeyboardInterrupt:
-            say(f"gaitshift: interrupted; continue with: gaitshift train --resume {run.folder}")
-            sys.exit(130)
+        except KeyboardInterrupt as stop:
+            command = f"gaitshift train --resume {run.folder}"
+            raise type(stop)(f"interrupted; continue with: {command}") from None
         if self.json:
             emit_json({**bar.row, "verdict": bar.verdict or None, "policy": str(path)})
             return
@@ -81,10 +81,17 @@ class Train(RobotOption):
                 f"training needs the package '{error.name}'; install gaitshift[train]"
             ) from error
         if self.resume is not None:
-            if self.gait is not None or self.robot_file is not None:
-                raise GaitshiftError(
-                    "a gait and --robot-file must not be given with --resume, which has its own"
-                )
+            for field in fields(Train):
+                if (
+                    field.name not in ("resume", "json")
+                    and getattr(self, field.name) != field.default
+                ):
+                    option = (
+                        "--" + field.name.replace("_", "-") if field.name != "gait" else "a gait"
+                    )
+                    raise GaitshiftError(
+                        f"{option} must not be given with --resume, which has its own settings"
+                    )
             return Run.resume(self.resume)
         if self.gait is None:
             known = ", ".join(gaits.names())

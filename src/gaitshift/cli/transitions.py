@@ -103,7 +103,7 @@ class Transitions(RobotOptions):
         rows = table.rows
         self._draw(rows)
         command = shlex.join(["gaitshift", *sys.argv[1:]])
-        (self.out / README).write_text(page(rows, command))
+        (self.out / README).write_text(page(rows, command), encoding="utf-8")
         from gaitshift.show.report.study_pages import write_transition_page
 
         write_transition_page(rows, self.out / PAGE, command=command)

@@ -50,6 +50,7 @@ class View(RobotOptions):
                 LivePage,
                 LiveRun,
                 ReplayPage,
+                address_of,
                 close,
                 serve,
             )
@@ -81,7 +82,7 @@ class View(RobotOptions):
                 page = ReplayPage(server, shown, robot)
             else:
                 page = LivePage(server, shown, lambda log: self._save(log, robot))
-            print(f"open http://{self.host}:{self.port} (Ctrl-C ends)", flush=True)
+            print(f"open {address_of(self.host, self.port)} (Ctrl-C ends)", flush=True)
             page.run()
         except KeyboardInterrupt:
             say("gaitshift: the page is closed")

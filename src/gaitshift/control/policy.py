@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import onnxruntime
 from jaxtyping import Float32
 
 from gaitshift.control.observation import Observation
@@ -17,14 +16,14 @@ from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Robot
 
+if TYPE_CHECKING:
+    import onnxruntime
+
 MOST_BYTES = 64 << 20
 """Size of the largest policy file that is read [bytes]; ours: a hundred times that of a shipped
 one."""
 
 _SHIPPED = Path(__file__).parent / "policies"
-
-_ONLY_WHAT_IS_ASKED: Any = cast(Any, onnxruntime).RunOptions()
-_ONLY_WHAT_IS_ASKED.only_execute_path_to_fetches = True  # skips the unused critic
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ class Policy:
     path: Path
     info: PolicyInfo
     machine: RewardMachine
-    session: onnxruntime.InferenceSession
+    session: "onnxruntime.InferenceSession"
     robot: Robot
     """The robot that it drives."""
 
@@ -77,8 +76,17 @@ class Policy:
         return self._run("value", observation)[:, 0]
 
     def _run(self, output: str, observation: np.ndarray) -> np.ndarray:
-        options = _ONLY_WHAT_IS_ASKED
-        return cast(Any, self.session).run([output], {"observation": observation}, options)[0]
+        session: Any = self.session
+        return session.run([output], {"observation": observation}, self._only_what_is_asked)[0]
+
+    @cached_property
+    def _only_what_is_asked(self) -> Any:
+        """Options of a run that skips the critic where its value is not asked for."""
+        import onnxruntime
+
+        options = cast(Any, onnxruntime).RunOptions()
+        options.only_execute_path_to_fetches = True
+        return options
 
 
 def shipped() -> tuple[str, ...]:
@@ -127,8 +135,10 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
     return policy
 
 
-def _open(path: Path) -> tuple[onnxruntime.InferenceSession, dict[str, str]]:
+def _open(path: Path) -> "tuple[onnxruntime.InferenceSession, dict[str, str]]":
     """The network of a file, and its metadata; all its texts are UTF-8."""
+    import onnxruntime  # slow to import, and the names of the shipped policies need none of it
+
     options = cast(Any, onnxruntime).SessionOptions()
     options.intra_op_num_threads = 1  # the networks are small, and the physics uses the cores
     options.log_severity_level = 4

@@ -116,7 +116,7 @@ class Run:
         if robot != ANYMAL_B:
             config["robot"] = to_dict(robot)
         # First, so that a folder that a kill left unfinished still shows what it is.
-        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n")
+        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n", encoding="utf-8")
         (folder / CHECKPOINTS).mkdir(exist_ok=True)
         run._save_checkpoint()
         return run

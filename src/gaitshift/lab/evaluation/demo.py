@@ -23,6 +23,9 @@ RUN_OUT = 8.0
 WIDTH = 8.0
 """Width of a track [m]."""
 
+LATEST = 3600.0
+"""Latest scheduled shift [s]; the longest run of `evaluate`, too."""
+
 START = 1.5
 """Where robots start along the track [m]."""
 
@@ -87,8 +90,11 @@ class DemoConfig:
                 f"at must give {max(0, len(self.gaits) - 1)} times for {len(self.gaits)} gaits, "
                 f"one for each shift, got {len(self.at)}"
             )
-        if any(late <= early for early, late in pairwise((0.0, *self.at))):
-            raise GaitshiftError(f"at must give rising times above 0 s, got {list(self.at)}")
+        rise = all(early < late <= LATEST for early, late in pairwise((0.0, *self.at)))
+        if not rise:  # NaN is neither above nor below a time
+            raise GaitshiftError(
+                f"at must give rising times above 0 and up to {LATEST:g} s, got {list(self.at)}"
+            )
 
     @property
     def shift_times(self) -> tuple[float, ...]:

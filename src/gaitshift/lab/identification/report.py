@@ -56,7 +56,9 @@ def write_report(
     conditions, courses = condition_rows(judged), course_rows(judged)
     for name, rows in ((CONDITIONS, conditions), (COURSES, courses)):
         table.write(out / name, rows)
-    (out / README).write_text(_readme(judged, conditions, courses, command, held_out, pictures))
+    (out / README).write_text(
+        _readme(judged, conditions, courses, command, held_out, pictures), encoding="utf-8"
+    )
     return conditions
 
 

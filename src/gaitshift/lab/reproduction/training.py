@@ -48,7 +48,7 @@ def train(job: Job, folder: Path) -> None:
     try:
         run.train()
     except DivergedError as error:
-        (folder / FAILED).write_text(f"{error}\n")
+        (folder / FAILED).write_text(f"{error}\n", encoding="utf-8")
 
 
 def iterations_done(folder: Path) -> int:

@@ -156,8 +156,9 @@ def _parts(robot: Robot) -> list[Part]:
     urdf = _description(robot)
     if urdf is None:
         return []
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    cache = base / "gaitshift" / f"{robot.name}-{metadata.version(_WHEEL)}.npz"
+    cache = _cache(robot)
+    if cache is None:
+        return convert(urdf)
     if cache.is_file():
         try:
             return _read(cache)
@@ -170,6 +171,15 @@ def _parts(robot: Robot) -> list[Part]:
     except OSError:
         pass  # a home that cannot be written to: converted anew each time
     return parts
+
+
+def _cache(robot: Robot) -> Path | None:
+    """The file that keeps a robot's surfaces; None for a user without a home."""
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        return None
+    return base / "gaitshift" / f"{robot.name}-{metadata.version(_WHEEL)}.npz"
 
 
 def _description(robot: Robot) -> Path | None:

@@ -68,7 +68,7 @@ def write_report(
     for name in written:
         write(out / name, parts[name])
     written += figures.draw(results, judged, out)
-    (out / README).write_text(_readme(results, found, judged, ablations, written))
+    (out / README).write_text(_readme(results, found, judged, ablations, written), encoding="utf-8")
     return {
         "out": str(out),
         "files": [README, *written],

@@ -1,7 +1,5 @@
 """Pictures of a model, rendered by OpenGL into arrays, and the camera that follows a robot."""
 
-import os
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -12,6 +10,7 @@ from jaxtyping import Float, UInt8
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log import Log
+from gaitshift.show.opengl import open_context
 from gaitshift.show.plots.signals import period, smoothed
 
 _MAX_GEOMS = 2000
@@ -55,8 +54,7 @@ class Ball:
 class Canvas:
     """Draws one model in one size; one at a time, to be closed when done.
 
-    Raises `VideoUnavailable` where there is no OpenGL. `MUJOCO_GL` selects the backend. Without it,
-    Linux without a display uses EGL, which needs no screen.
+    Raises `VideoUnavailable` where there is no OpenGL.
     """
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
@@ -65,7 +63,7 @@ class Canvas:
         self._pixels = np.empty((height, width, 3), dtype=np.uint8)
         self._gl: Any = None
         try:
-            self._gl = _open_context(width, height)
+            self._gl = open_context(width, height)
             self._context = mujoco.MjrContext(model, _FONT)
         except Exception as error:  # each way to OpenGL fails in its own class
             if self._gl is not None:
@@ -117,19 +115,6 @@ class Canvas:
         )
         geom.emission = _GLOW
         self._scene.ngeom += 1
-
-
-def _open_context(width: int, height: int) -> Any:
-    """An OpenGL context, made current."""
-    display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if sys.platform == "linux" and not display and not os.environ.get("MUJOCO_GL"):
-        # MuJoCo reads MUJOCO_GL once, when it is imported: too early to set it for the user here.
-        from mujoco.egl import GLContext
-    else:
-        from mujoco.gl_context import GLContext
-    context = GLContext(width, height)
-    context.make_current()
-    return context
 
 
 def _first_line(error: Exception) -> str:

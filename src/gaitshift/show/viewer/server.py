@@ -30,14 +30,16 @@ def serve(host: str, port: int) -> viser.ViserServer:
     """
     if not 1 <= port <= 65535:
         raise GaitshiftError(f"port must be 1 to 65535, got {port}")
-    with socket.socket() as trial:
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            trial.bind((host, port))
-        except OSError as error:
-            raise GaitshiftError(
-                f"cannot listen on {host}:{port} ({error.strerror}); give another --port"
-            ) from error
+    try:
+        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind(address)
+    except (OSError, UnicodeError) as error:  # a name that is no host name is a UnicodeError
+        reason = getattr(error, "strerror", None) or error
+        raise GaitshiftError(
+            f"cannot listen on {host}:{port} ({reason}); give another --host or --port"
+        ) from error
     with redirect_stdout(io.StringIO()):  # it prints a box of its own
         server = viser.ViserServer(host=host, port=port, label="gaitshift", verbose=False)
     gui = cast(Any, server.gui)
@@ -52,6 +54,12 @@ def serve(host: str, port: int) -> viser.ViserServer:
     server.initial_camera.position = _CAMERA
     server.initial_camera.look_at = (0.0, 0.0, 0.35)
     return server
+
+
+def address_of(host: str, port: int) -> str:
+    """The address that opens the page on this machine."""
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # not addresses, but all of them
+    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
 def as_markdown(text: str) -> str:
