@@ -287,6 +287,38 @@ def test_a_run_that_was_killed_goes_on_where_it_stopped(
     assert not (out / "unfinished").exists()
 
 
+def test_a_run_that_was_killed_while_it_drew_goes_on(tmp_path, monkeypatch, two_logs, whole):
+    out = tmp_path / "out"
+
+    def half_a_picture(judged, path):
+        path.touch()
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("gaitshift.show.plots.identification.condition_map", half_a_picture)
+        with pytest.raises(SystemExit):
+            identify(two_logs, out)
+    assert (out / "paper.png").stat().st_size == 0
+    replayed = replayed_logs(monkeypatch)
+    identify(two_logs, out)
+    assert not replayed
+    assert report_in(out) == whole
+    assert (out / "paper.png").stat().st_size > 1000
+
+
+def test_a_picture_of_someone_else_beside_an_unfinished_run_is_not_replaced(
+    tmp_path, monkeypatch, two_logs
+):
+    out = tmp_path / "out"
+    replayed_logs(monkeypatch, killed_at=1)
+    with pytest.raises(SystemExit):
+        identify(two_logs, out)
+    (out / "holiday.png").touch()
+    with pytest.raises(SystemExit) as end:
+        identify(two_logs, out)
+    assert end.value.code == 2
+
+
 def test_what_was_kept_of_a_log_is_not_used_for_another_one_of_its_name(
     tmp_path, monkeypatch, two_logs
 ):

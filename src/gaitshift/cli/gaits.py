@@ -10,6 +10,7 @@ from gaitshift.cli.output import check_folder, emit_json, say
 from gaitshift.control import policy
 from gaitshift.gait import RewardMachine, draw, gaits, mermaid
 from gaitshift.shift import load_graph
+from gaitshift.whole_file import write_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class Gaits:
         if self.out is not None:
             for machine in machines:
                 draw(machine, self.out / f"{machine.name}.png")
-                (self.out / f"{machine.name}.mmd").write_text(mermaid(machine) + "\n")
+                write_text(self.out / f"{machine.name}.mmd", mermaid(machine) + "\n")
             say(f"drawings in {self.out}: {', '.join(files)}")
 
 

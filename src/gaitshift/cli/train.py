@@ -3,7 +3,9 @@
 import shlex
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,6 +17,7 @@ from gaitshift.cli.output import emit_json, say
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import flat_verdict
 
@@ -55,14 +58,16 @@ class Train(RobotOption):
 
     def run(self) -> None:
         """Trains, with a progress bar."""
-        run = self._open()
-        bar = _Bar(run)
-        try:
-            with bar:
-                path = run.train(bar, bar.judge)
-        except KeyboardInterrupt:
-            say(f"gaitshift: interrupted; continue with: gaitshift train --resume {run.folder}")
-            sys.exit(130)
+        folder, begin = self._beginning()
+        with only_writer(folder):
+            run = begin(folder)
+            bar = _Bar(run)
+            try:
+                with bar:
+                    path = run.train(bar, bar.judge)
+            except KeyboardInterrupt:
+                say(f"gaitshift: interrupted; continue with: gaitshift train --resume {folder}")
+                sys.exit(130)
         if self.json:
             emit_json({**bar.row, "verdict": bar.verdict or None, "policy": str(path)})
             return
@@ -70,7 +75,8 @@ class Train(RobotOption):
             print(f"{_spell(bar.verdict)}, {bar.verdict['misses'] or 'no limit missed'}")
         print(f"policy written to {path}; evaluate it with: gaitshift evaluate {path}")
 
-    def _open(self) -> "Run":
+    def _beginning(self) -> tuple[Path, "Callable[[Path], Run]"]:
+        """The folder of the run, and what begins or resumes it there."""
         try:
             from gaitshift.learn.recipe import PRESETS
             from gaitshift.learn.run import Run
@@ -83,7 +89,7 @@ class Train(RobotOption):
                 raise GaitshiftError(
                     "a gait and --robot-file must not be given with --resume, which has its own"
                 )
-            return Run.resume(self.resume)
+            return self.resume, Run.resume
         if self.gait is None:
             known = ", ".join(gaits.names())
             raise GaitshiftError(
@@ -100,10 +106,10 @@ class Train(RobotOption):
         if self.iterations is not None:
             recipe = recipe.with_iterations(self.iterations)
         folder = self.out or Path("runs") / f"{machine.name}-{self.seed}"
-        return Run.create(
-            folder,
-            machine,
-            recipe,
+        return folder, partial(
+            Run.create,
+            machine=machine,
+            recipe=recipe,
             seed=self.seed,
             command=shlex.join(["gaitshift", *sys.argv[1:]]),
             robot=robot,

@@ -133,6 +133,12 @@ class Task:
         return CANDIDATES if self.everything else named
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the conditions, with that of the classifier where it may be among them."""
+        classifier = (NAME,) if self.everything or NAME in self.conditions else ()
+        return (*(candidate.name for candidate in self.wanted), *classifier)
+
+    @property
     def judges(self) -> tuple[Path, ...]:
         """Logs for judging."""
         return self.held_out or self.logs
@@ -165,7 +171,7 @@ class Task:
         self, cache: StepCache, learned: tuple[Stamp, ...], report: Callable[[str], None]
     ) -> RoughnessClassifier | None:
         """The classifier, where it is compared and can learn."""
-        if not self.everything and NAME not in self.conditions:
+        if NAME not in self.names:
             return None
         work = partial(_fit, self.logs, self.way)
         try:

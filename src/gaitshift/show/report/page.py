@@ -7,6 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from gaitshift.whole_file import write_text
+
 Row = tuple[Sequence[str], float | None]
 """Cells of a row, and the time to which a click on it seeks [s]."""
 
@@ -55,9 +57,7 @@ def write_page(
     text = _read("page.html")
     for name, content in parts.items():
         text = text.replace(f"@{name}@", content, 1)
-    part = path.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    write_text(path, text)
 
 
 def figure(name: str) -> str:
