@@ -89,6 +89,8 @@ class Train(RobotOption):
                 raise GaitshiftError(
                     "a gait and --robot-file must not be given with --resume, which has its own"
                 )
+            if not self.resume.is_dir():
+                raise GaitshiftError(f"{self.resume} is not a training run: it is not a folder")
             return self.resume, Run.resume
         if self.gait is None:
             known = ", ".join(gaits.names())

@@ -5,7 +5,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 
@@ -89,8 +89,7 @@ def _write(path: Path, key: str, plain: Any) -> None:
 
     def put_aside(value: Any) -> Any:
         if isinstance(value, np.generic):
-            number: Any = value.item()
-            return number
+            return cast(Any, value).item()
         arrays[f"array_{len(arrays)}"] = value
         return {"array": len(arrays) - 1}
 
