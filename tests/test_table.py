@@ -55,12 +55,32 @@ def test_a_table_that_grows_is_the_one_that_the_csv_module_writes(tmp_path):
     assert path.read_bytes() == expected.getvalue().encode()
 
 
-def test_a_last_row_that_a_kill_cut_short_is_left_out_where_that_may_be(tmp_path):
-    path = tmp_path / "progress.csv"
-    path.write_text("a,b\r\n1,2\r\n3")
-    assert read(path, may_be_cut=True) == [{"a": "1", "b": "2"}]
-    with pytest.raises(GaitshiftError, match=r"progress\.csv, line 3 is damaged"):
-        read(path)
+WHOLE = b'a,b\r\n1,"no, none"\r\n3,50\r\n'
+
+
+@pytest.mark.parametrize("size", range(len(WHOLE)))
+def test_of_a_table_cut_at_any_byte_the_rows_with_a_line_end_are_read(size, tmp_path):
+    """50 cut to 5 would be a row of other numbers."""
+    path, rows = tmp_path / "progress.csv", [{"a": "1", "b": "no, none"}, {"a": "3", "b": "50"}]
+    path.write_bytes(WHOLE[:size])
+    ends = [at for at in range(len(WHOLE)) if WHOLE[at : at + 1] == b"\r"]
+    assert read(path, may_be_cut=True) == rows[: max(0, sum(at < size for at in ends) - 1)]
+
+
+def test_a_cut_last_row_is_damage_in_a_table_that_is_written_whole(tmp_path):
+    path = tmp_path / "runs.csv"
+    for cut in (b"a,b\n1,2\n3", b"a,b\n1,2\n3,5"):
+        path.write_bytes(cut)
+        with pytest.raises(GaitshiftError, match=r"runs\.csv, line 3 is damaged"):
+            read(path)
+
+
+def test_a_row_of_a_study_that_is_cut_in_its_last_cell_is_not_taken_as_whole(tmp_path):
+    path, columns = tmp_path / "falls.csv", {"gait": str, "falls": int}
+    rows = [{"gait": "trot", "falls": 10}, {"gait": "pace", "falls": 25}]
+    write(path, rows, columns)
+    path.write_bytes(path.read_bytes()[:-2])
+    assert read_typed(path, columns, "falls") == rows[:1]
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2,3\n4,5\n", "a,b\n1\n2,3\n"])

@@ -1,6 +1,7 @@
 """Tables as files: CSV read and written whole, row by row or as a stream, and Markdown."""
 
 import csv
+import io
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -8,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.whole_file import replacing
 
 Row = dict[str, Any]
 """A row of a table by the names of its columns."""
@@ -35,13 +37,16 @@ def read(path: Path, *, may_be_cut: bool = False) -> list[dict[str, str]]:
 
     Args:
         path: the file.
-        may_be_cut: whether a last row with too few cells, as a kill leaves it, is left out.
+        may_be_cut: whether a last row without a line end, as a kill leaves it, is left out.
 
     Raises:
-        GaitshiftError: the file cannot be read, or a row has more or fewer cells than the header.
+        GaitshiftError: the file cannot be read, a row has more or fewer cells than the header, or
+            the last row is cut.
     """
-    _, rows = _read(path)
-    if may_be_cut and rows and None in rows[-1].values():
+    _, rows, is_cut = _read(path)
+    if is_cut and rows and not may_be_cut:
+        raise GaitshiftError(f"{path}, line {len(rows) + 1} is damaged: it must end in a line end")
+    if is_cut and rows:
         rows.pop()
     for number, row in enumerate(rows, start=2):
         if not _is_whole(row):
@@ -52,14 +57,16 @@ def read(path: Path, *, may_be_cut: bool = False) -> list[dict[str, str]]:
 def read_typed(path: Path, columns: Columns, what: str) -> list[Row]:
     """The rows of an earlier, perhaps unfinished, table of `what`; no rows without a file.
 
-    An empty cell stays an empty string.
+    An empty cell stays an empty string. A last row without a line end is cut and left out.
 
     Raises:
         GaitshiftError: the file is another table.
     """
     if not path.is_file():
         return []
-    names, rows = _read(path)
+    names, rows, is_cut = _read(path)
+    if is_cut and rows:
+        rows.pop()
     if names != tuple(columns) or not all(map(_is_whole, rows)):
         raise GaitshiftError(f"{path} is not a table of {what}; give another --out, or --overwrite")
     try:
@@ -79,7 +86,10 @@ def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = Non
 
 
 def append(path: Path, row: Row) -> None:
-    """Adds a row to a CSV file; a new file gets a header first."""
+    """Adds a row to a CSV file; a new file gets a header first.
+
+    A kill can cut the row, so that it has no line end.
+    """
     new = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, row.keys(), lineterminator=_GROWING_LINE_END)
@@ -147,21 +157,25 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]]]:
-    """Names of the columns, and rows: missing cells are None, surplus cells have the key None."""
+def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]], bool]:
+    """Names of the columns, rows, and whether the last line lacks its end.
+
+    Missing cells of a row are None, surplus cells have the key None.
+    """
     if path.is_file() and path.stat().st_size > MOST_BYTES:
         raise GaitshiftError(
             f"{path} must have {MOST_BYTES >> 20} MB or less, got {path.stat().st_size >> 20} MB"
         )
     try:
         with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            columns, rows = tuple(reader.fieldnames or ()), list(reader)
+            text = file.read()
+        reader = csv.DictReader(io.StringIO(text, newline=""))
+        columns, rows = tuple(reader.fieldnames or ()), list(reader)
     except OSError as error:
         raise GaitshiftError(f"{path} cannot be read: {error.strerror}") from error
     except (UnicodeDecodeError, csv.Error) as error:
         raise GaitshiftError(f"{path} is damaged: {error}") from error
-    return columns, rows
+    return columns, rows, not text.endswith(("\n", "\r"))
 
 
 def _is_whole(row: Mapping[str, str]) -> bool:
@@ -169,12 +183,10 @@ def _is_whole(row: Mapping[str, str]) -> bool:
 
 
 def _write(path: Path, rows: Sequence[Row], columns: tuple[str, ...], line_end: str) -> None:
-    part = path.with_suffix(".part")
-    with part.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, columns, lineterminator=line_end)
         lines.writeheader()
         lines.writerows(rows)
-    part.replace(path)
 
 
 def _arrays(path: Path, batch: Any, known: Collection[str]) -> dict[str, np.ndarray]:

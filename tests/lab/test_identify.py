@@ -2,7 +2,9 @@
 
 import csv
 import json
+import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,10 +13,12 @@ from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification import auc, log_files
 from gaitshift.lab.identification.candidates import CANDIDATES
-from gaitshift.lab.identification.classifier import RoughnessClassifier
+from gaitshift.lab.identification.classifier import Examples, RoughnessClassifier
 from gaitshift.lab.identification.judging import judge, replay_rules
+from gaitshift.lab.identification.kept import EXAMPLES, REPLAYED, TRIED
 from gaitshift.lab.identification.passage import passage_scores
 from gaitshift.lab.identification.statistics import auc_interval
+from gaitshift.lab.identification.step_cache import StepCache
 from gaitshift.lab.identification.tuning import as_given, try_grids, tune
 from gaitshift.shift import HeightDifference, PlaneResidual, Rule, TouchdownSurprise
 from marches import march, table, walk
@@ -296,6 +300,38 @@ def test_a_run_that_was_killed_goes_on_where_it_stopped(
     assert not (out / "unfinished").exists()
 
 
+def test_a_run_that_was_killed_while_it_drew_goes_on(tmp_path, monkeypatch, two_logs, whole):
+    out = tmp_path / "out"
+
+    def half_a_picture(judged, path):
+        path.touch()
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("gaitshift.show.plots.identification.condition_map", half_a_picture)
+        with pytest.raises(SystemExit):
+            identify(two_logs, out)
+    assert (out / "paper.png").stat().st_size == 0
+    replayed = replayed_logs(monkeypatch)
+    identify(two_logs, out)
+    assert not replayed
+    assert report_in(out) == whole
+    assert (out / "paper.png").stat().st_size > 1000
+
+
+def test_a_picture_of_someone_else_beside_an_unfinished_run_is_not_replaced(
+    tmp_path, monkeypatch, two_logs
+):
+    out = tmp_path / "out"
+    replayed_logs(monkeypatch, killed_at=1)
+    with pytest.raises(SystemExit):
+        identify(two_logs, out)
+    (out / "holiday.png").touch()
+    with pytest.raises(SystemExit) as end:
+        identify(two_logs, out)
+    assert end.value.code == 2
+
+
 def test_what_was_kept_of_a_log_is_not_used_for_another_one_of_its_name(
     tmp_path, monkeypatch, two_logs
 ):
@@ -333,6 +369,91 @@ def test_the_classifier_goes_on_too(tmp_path, monkeypatch, two_logs):
                 identify(two_logs, folder, ["classifier"])
     assert seen == ["walk-1"], "the last log to be judged by"
     assert report_in(out) == report_in(whole)
+
+
+class Trap:
+    """Runs code where it is unpickled."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return Path.touch, (self.mark,)
+
+
+def replace_by_a_pickle(path, trap):
+    path.write_bytes(pickle.dumps(trap))
+
+
+def replace_by_an_array_of_objects(path, trap):
+    np.savez(path.with_suffix(""), text=np.array([trap], dtype=object))
+
+
+def replace_by_half(path, trap):
+    del trap
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def replace_by_text(path, trap):
+    del trap
+    np.savez(
+        path.with_suffix(""), text=np.frombuffer(b'{"format": 1, "key": "", "result": []}', "u1")
+    )
+
+
+@pytest.mark.parametrize(
+    "craft",
+    [replace_by_a_pickle, replace_by_an_array_of_objects, replace_by_half, replace_by_text],
+)
+def test_no_file_that_an_unfinished_run_keeps_is_run(tmp_path, monkeypatch, two_logs, whole, craft):
+    out, mark = tmp_path / "out", tmp_path / "code-was-run"
+    replayed_logs(monkeypatch, killed_at=2)
+    with pytest.raises(SystemExit):
+        identify(two_logs, out)
+    kept = [path for path in (out / "unfinished").rglob("*") if path.is_file()]
+    assert kept
+    for path in kept:
+        craft(path, Trap(mark))
+    replayed = replayed_logs(monkeypatch)
+    identify(two_logs, out)
+    assert not mark.exists()
+    assert len(replayed) == 4, "what cannot be read is done again"
+    assert report_in(out) == whole
+
+
+def test_what_is_kept_of_a_log_is_what_was_found_to_the_last_bit(tmp_path):
+    some = [c for c in CANDIDATES if c.name in ("paper", "height_difference", "oracle")]
+
+    def logs():
+        return [march("into", noise=0.04, seconds=10.0, robots=2)]
+
+    tried = try_grids(some, logs(), "rough")
+    replayed = replay_rules(tune(some, tried), logs())
+    examples = Examples.of(logs())
+    for form, found in ((TRIED, tried), (REPLAYED, replayed), (EXAMPLES, examples)):
+        StepCache(tmp_path, print).get("step", (), form, lambda found=found: found)
+        again = StepCache(tmp_path, print).get("step", (), form, pytest.fail)
+        assert_same(again, found)
+        next(tmp_path.iterdir()).unlink()
+
+
+def assert_same(one, other):
+    """Two results have the same types, the same shapes and the same bits all the way down."""
+    assert type(one) is type(other)
+    if isinstance(one, np.ndarray):
+        assert (one.dtype, one.shape) == (other.dtype, other.shape)
+        np.testing.assert_array_equal(one, other)
+    elif isinstance(one, dict):
+        assert list(one) == list(other)
+        assert_same(list(one.values()), list(other.values()))
+    elif isinstance(one, list | tuple):
+        assert len(one) == len(other)
+        for part, of_other in zip(one, other, strict=True):
+            assert_same(part, of_other)
+    elif hasattr(one, "__dict__"):
+        assert_same(vars(one), vars(other))
+    else:
+        assert one == other
 
 
 def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys):

@@ -5,9 +5,10 @@ import shutil
 
 import pytest
 
+from full_disk import full_disk
 from gaitshift.errors import GaitshiftError
 from gaitshift.learn.run import Run
-from training import create, rows, same_bits, weights
+from training import KilledError, create, rows, same_bits, weights
 
 
 @pytest.mark.parametrize(
@@ -74,6 +75,64 @@ def test_overwriting_an_earlier_run_leaves_nothing_of_it(tmp_path, whole):
     assert [file.name for file in (folder / "checkpoints").iterdir()] == ["000000.pt"]
     assert sorted(file.name for file in folder.iterdir()) == ["checkpoints", "config.json"]
     assert Run.resume(folder).iteration == 0
+
+
+def killed_before_its_first_checkpoint(folder, monkeypatch):
+    """The config file as it was then."""
+
+    def killed(*_):
+        raise KilledError
+
+    with monkeypatch.context() as patched:
+        patched.setattr("torch.save", killed)
+        with pytest.raises(KilledError):
+            create(folder)
+    return (folder / "config.json").read_bytes()
+
+
+def test_a_run_killed_before_its_first_checkpoint_begins_again_in_its_folder(
+    tmp_path, monkeypatch, whole
+):
+    killed_before_its_first_checkpoint(tmp_path, monkeypatch)
+    (tmp_path / "checkpoints" / "000000.pt.part").write_bytes(b"half")
+    run = create(tmp_path)
+    assert same_bits(weights(run), weights(Run.resume(tmp_path)))
+    run.train()
+    assert same_bits(weights(run), weights(whole[0]))
+
+
+def test_a_run_killed_before_its_first_checkpoint_is_resumed_from_its_beginning(
+    tmp_path, monkeypatch, whole
+):
+    killed_before_its_first_checkpoint(tmp_path, monkeypatch)
+    run = Run.resume(tmp_path)
+    assert run.iteration == 0
+    run.train()
+    assert same_bits(weights(run), weights(whole[0]))
+    assert rows(tmp_path) == rows(whole[0].folder)
+
+
+@pytest.mark.parametrize("length", [0, 7, 100])
+def test_a_run_whose_config_was_torn_by_a_full_disk_begins_again(tmp_path, monkeypatch, length):
+    config = killed_before_its_first_checkpoint(tmp_path, monkeypatch)
+    (tmp_path / "config.json").write_bytes(config[:length])
+    create(tmp_path)
+    assert (tmp_path / "config.json").read_bytes() == config
+    assert Run.resume(tmp_path).iteration == 0
+
+
+def test_a_config_of_another_program_is_not_ours_to_replace(tmp_path):
+    (tmp_path / "config.json").write_text('{"theme": "dark"}')
+    with pytest.raises(GaitshiftError, match="not empty"):
+        create(tmp_path)
+    assert (tmp_path / "config.json").read_text() == '{"theme": "dark"}'
+
+
+def test_a_full_disk_leaves_no_torn_config_behind(tmp_path):
+    with full_disk(), pytest.raises(OSError, match="File too large"):
+        create(tmp_path)
+    assert not list(tmp_path.iterdir())
+    create(tmp_path)
 
 
 def refusal(folder):
@@ -146,6 +205,17 @@ def test_a_damaged_checkpoint_is_named_and_without_it_the_run_goes_on_from_the_o
     run.train()
     assert same_bits(weights(run), weights(whole[0]))
     assert rows(copied) == rows(whole[0].folder)
+
+
+def test_a_verdict_cut_in_its_last_cell_is_made_again(copied):
+    verdict = {"gait": "trot", "clean": False, "misses": "stride 2.10 Hz above 2.00"}
+    run = Run.resume(copied)
+    run.train(judge=lambda path: verdict)
+    path = copied / "verdicts.csv"
+    whole_file = path.read_bytes()
+    path.write_bytes(whole_file[:-6])
+    Run.resume(copied).train(judge=lambda path: verdict)
+    assert path.read_bytes() == whole_file
 
 
 def test_a_run_without_checkpoints_cannot_go_on(copied):

@@ -1,5 +1,6 @@
 """`gaitshift bench`: speed of the environment, and training time until a gait."""
 
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,6 +12,7 @@ from gaitshift.cli.output import check_table_folder, emit_json, emit_table, prog
 from gaitshift.control import policy
 from gaitshift.data import located
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.benchmark.outcome import (
     COLUMNS,
     Outcome,
@@ -168,15 +170,10 @@ class Bench:
         options = self.time_to_gait
         config, out = options.config(), options.out
         known: list[Outcome] = []
-        if out is not None:
-            path = out / TABLE
-            check_table_folder(path, overwrite=options.overwrite)
-            earlier = [] if options.overwrite else table.read_typed(path, COLUMNS, "trainings")
-            with located(str(path)):
-                known = [outcome_of(row) for row in earlier]
-            out.mkdir(parents=True, exist_ok=True)
         outcomes: list[Outcome] = []
-        with progress("training") as report:
+        with nullcontext() if out is None else only_writer(out), progress("training") as report:
+            if out is not None:
+                known = self._known(out / TABLE)
             for outcome in time_to_gait(config, known):
                 outcomes.append(outcome)
                 report(len(outcomes), config.trainings)
@@ -190,6 +187,14 @@ class Bench:
             emit_json({"check": asdict(config.check), "gaits": found})
             return
         emit_table("time to gait, median over seeds (all seeds)", _rows(found))
+
+    def _known(self, path: Path) -> list[Outcome]:
+        """The outcomes in an earlier table."""
+        overwrite = self.time_to_gait.overwrite
+        check_table_folder(path, overwrite=overwrite)
+        rows = [] if overwrite else table.read_typed(path, COLUMNS, "trainings")
+        with located(str(path)):
+            return [outcome_of(row) for row in rows]
 
 
 def _draw(outcomes: list[Outcome], out: Path) -> None:

@@ -12,8 +12,10 @@ import tyro
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
 from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.evaluation import DemoConfig, run_demo
 from gaitshift.lab.log import Log
+from gaitshift.whole_file import write_text
 
 PAGE, VIDEO, PICTURE = "index.html", "demo.mp4", "demo.png"
 LOG, SUMMARY = "log.npz", "summary.json"
@@ -72,19 +74,19 @@ class Demo(RobotOptions, DemoConfig):
         _ = self.used  # raises an error before any work
         make = self.maker(self.controller)
         files = (PAGE, VIDEO, PICTURE, LOG, SUMMARY)
-        check_folder(self.out, overwrite=self.overwrite, ours=files)
-        with progress("walking") as report:
-            log, summaries = run_demo(self, report, make=make)
-        summary = self._summary(summaries)
-        self.out.mkdir(parents=True, exist_ok=True)
-        log.save(self.out / LOG)
-        (self.out / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-        self._draw(log)
-        written = [SUMMARY, PICTURE, LOG]
-        if self.video and self._render(log):
-            written.insert(0, VIDEO)
-        self._report(log)
-        written.insert(0, PAGE)
+        with only_writer(self.out):
+            check_folder(self.out, overwrite=self.overwrite, ours=files)
+            with progress("walking") as report:
+                log, summaries = run_demo(self, report, make=make)
+            summary = self._summary(summaries)
+            log.save(self.out / LOG)
+            write_text(self.out / SUMMARY, json.dumps(summary, indent=2) + "\n")
+            self._draw(log)
+            written = [SUMMARY, PICTURE, LOG]
+            if self.video and self._render(log):
+                written.insert(0, VIDEO)
+            self._report(log)
+            written.insert(0, PAGE)
         if self.json:
             emit_json(summary)
             return

@@ -8,6 +8,7 @@ import tyro
 
 from gaitshift.cli.output import check_folder, emit_json, say
 from gaitshift.data import tables_in
+from gaitshift.whole_file import write_text
 
 _PACKAGE = Path(__file__).parents[1]
 _GAITS, _POLICIES = _PACKAGE / "gait" / "gaits", _PACKAGE / "control" / "policies"
@@ -61,8 +62,7 @@ class Gaits:
         if self.out is not None:
             for machine in machines:
                 draw(machine, self.out / f"{machine.name}.png")
-                text = mermaid(machine) + "\n"
-                (self.out / f"{machine.name}.mmd").write_text(text, encoding="utf-8")
+                write_text(self.out / f"{machine.name}.mmd", mermaid(machine) + "\n")
             say(f"drawings in {self.out}: {', '.join(files)}")
 
 

@@ -12,6 +12,7 @@ import tyro
 
 from gaitshift.cli.output import check_folder, emit_json, emit_table, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 
 if TYPE_CHECKING:
     from gaitshift.lab.identification.judging import Judged
@@ -82,24 +83,24 @@ class Identify:
             way=self.way,
             numbers=numbers,
         )
-        ours = (*reports.FILES, ROC, PAGE)
-        check_folder(self.out, overwrite=self.overwrite, ours=ours, left=UNFINISHED)
-        judged = task.run(self.out / UNFINISHED, say)
-        self.out.mkdir(parents=True, exist_ok=True)
-        command = shlex.join(["gaitshift", *sys.argv[1:]])
-        rows = reports.write_report(
-            judged,
-            self.out,
-            command=command,
-            held_out=bool(self.held_out),
-            pictures=_draw(judged, self.out),
-        )
-        from gaitshift.show.report.study_pages import write_identification_page
+        with only_writer(self.out):
+            ours = (*reports.FILES, ROC, PAGE, *map(_picture, task.names))
+            check_folder(self.out, overwrite=self.overwrite, ours=ours, begun=UNFINISHED)
+            judged = task.run(self.out / UNFINISHED, say)
+            command = shlex.join(["gaitshift", *sys.argv[1:]])
+            rows = reports.write_report(
+                judged,
+                self.out,
+                command=command,
+                held_out=bool(self.held_out),
+                pictures=_draw(judged, self.out),
+            )
+            from gaitshift.show.report.study_pages import write_identification_page
 
-        title, words = reports.introduction(judged, bool(self.held_out))
-        page = self.out / PAGE
-        write_identification_page(judged, page, title=title, words=words, command=command)
-        shutil.rmtree(self.out / UNFINISHED)
+            title, words = reports.introduction(judged, bool(self.held_out))
+            page = self.out / PAGE
+            write_identification_page(judged, page, title=title, words=words, command=command)
+            shutil.rmtree(self.out / UNFINISHED)
         if self.json:
             emit_json({"out": str(self.out), "conditions": rows})
         else:
@@ -117,10 +118,15 @@ def _draw(judged: "Sequence[Judged]", out: Path) -> dict[str, str]:
         if one.tuned.choice.is_free is None:
             continue  # no map for given numbers
         name = one.tuned.candidate.name
-        condition_map(one, out / f"{name}.png")
-        pictures[f"{name}.png"] = f"Mean delay of {name} over α and β"
+        condition_map(one, out / _picture(name))
+        pictures[_picture(name)] = f"Mean delay of {name} over α and β"
     met = hardest_first(judged)
     if met:
         roc_figure(judged, met[0], out / ROC)
         pictures[ROC] = f"ROC curves on {met[0]}"
     return pictures
+
+
+def _picture(condition: str) -> str:
+    """File of the map of a condition."""
+    return f"{condition}.png"

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import LOCK
+from gaitshift.whole_file import PART
 
 Report = Callable[[int, int], None]
 """Takes the work done and the total."""
@@ -63,18 +65,22 @@ def progress(label: str) -> Generator[Report]:
 
 
 def check_folder(
-    folder: Path, *, overwrite: bool, ours: tuple[str, ...], left: str | None = None
+    folder: Path, *, overwrite: bool, ours: tuple[str, ...], begun: str | None = None
 ) -> None:
     """`GaitshiftError` for an output folder with content, unless `overwrite`; creates nothing.
 
-    It deletes nothing either: the files in `ours` will be replaced, others stay. The entry `left`
-    by a killed run does not count as content.
+    It deletes nothing either: the files in `ours` will be replaced, others stay. What a killed run
+    leaves is no content: its lock, files that it was writing, and, where there is an entry `begun`,
+    that entry and the files in `ours`.
     """
     if folder.exists() and not folder.is_dir():
         raise GaitshiftError(f"--out must be a folder, got the file {folder}")
     if overwrite or not folder.is_dir():
         return
-    if any(path.name != left for path in folder.iterdir()):
+    there = {path.name for path in folder.iterdir() if not path.name.endswith(PART)} - {LOCK}
+    if begun in there:
+        there -= {begun, *ours}
+    if there:
         raise GaitshiftError(
             f"{folder} exists and is not empty; give another --out, or --overwrite to replace "
             f"{', '.join(ours)} there"

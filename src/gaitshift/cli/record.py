@@ -15,6 +15,7 @@ from gaitshift.control import Controller
 from gaitshift.control import policy as policies
 from gaitshift.control.controller import controller_maker
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select
 from gaitshift.lab.log import Log
@@ -73,17 +74,17 @@ class Record(RobotOption):
             for name, gait in zip(self.policies, gaits, strict=True)
             for course in chosen
         ]
-        found = self._found([(gait, course) for _, gait, course in asked])
-        self.out.mkdir(parents=True, exist_ok=True)
-        parts = [
-            Part(
-                name=str(path := self._path(gait, course)),
-                find=partial(found.get, path),
-                work=partial(self._record, name, gait, course),
-            )
-            for name, gait, course in asked
-        ]
-        rows = run_missing(parts, progress=progress, say=say)
+        with only_writer(self.out):
+            found = self._found([(gait, course) for _, gait, course in asked])
+            parts = [
+                Part(
+                    name=str(path := self._path(gait, course)),
+                    find=partial(found.get, path),
+                    work=partial(self._record, name, gait, course),
+                )
+                for name, gait, course in asked
+            ]
+            rows = run_missing(parts, progress=progress, say=say)
         if self.json:
             emit_json({"logs": rows})
         else:

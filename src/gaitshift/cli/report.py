@@ -1,6 +1,7 @@
 """`gaitshift report`: a log, or a training, as one page that opens from disk."""
 
 import tempfile
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +12,7 @@ from gaitshift.cli.output import progress, say
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy as policies
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
@@ -56,7 +58,9 @@ class Report(RobotOption):
         if not path.parent.is_dir():
             raise GaitshiftError(f"no folder {path.parent} for the page")
         if log is None:
-            self._tell_training(path, description)
+            is_inside = path.parent.resolve() == self.source.resolve()
+            with only_writer(self.source) if is_inside else nullcontext():
+                self._tell_training(path, description)
         else:
             from gaitshift.show.report import write_report  # matplotlib is slow to import
 

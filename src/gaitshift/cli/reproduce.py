@@ -1,6 +1,7 @@
 """`gaitshift reproduce`: trains with the paper's recipe, and compares the results."""
 
 import os
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -8,6 +9,7 @@ from typing import Annotated, Any
 from gaitshift.cli.demo import names_option
 from gaitshift.cli.output import emit_json, emit_table, progress, say
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 
 RESULTS, RUNS = Path("docs/results/paper"), Path("runs/reproduce")
 QUICK_RESULTS, QUICK_RUNS = Path("runs/reproduce-quick/results"), Path("runs/reproduce-quick")
@@ -59,12 +61,17 @@ class Reproduce:
             if not there.is_dir():
                 raise GaitshiftError(f"--out and --runs must be a folder, got the file {there}")
         plan = Plan.tiny(self.seed) if self.quick else Plan(seed=self.seed)
-        earlier = EarlierRuns.read(plan, out) if self.add else EarlierRuns()
-        wanted = [job for job in plan.select(self.only) if job.name not in earlier.curves]
-        with progress(f"{len(wanted)} runs") as report:
-            train_all(wanted, runs, self.jobs, report)
-        with progress("judging") as report:
-            written = write_report(Results.read(plan, runs, earlier), runs, out, earlier, report)
+        with ExitStack() as held:
+            for folder in dict.fromkeys((runs.resolve(), out.resolve())):
+                held.enter_context(only_writer(folder))
+            earlier = EarlierRuns.read(plan, out) if self.add else EarlierRuns()
+            wanted = [job for job in plan.select(self.only) if job.name not in earlier.curves]
+            with progress(f"{len(wanted)} runs") as report:
+                train_all(wanted, runs, self.jobs, report)
+            with progress("judging") as report:
+                written = write_report(
+                    Results.read(plan, runs, earlier), runs, out, earlier, report
+                )
         _say_broken(written)
         if self.json:
             emit_json(written)

@@ -18,8 +18,10 @@ from gaitshift.cli.output import (
 )
 from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.resume import Report, ResumableTable, run_missing
 from gaitshift.table import Row
+from gaitshift.whole_file import write_text
 
 TABLE = "crossings.csv"
 
@@ -75,38 +77,40 @@ class Study(RobotOptions):
         every = strategies(self.flat_gait, self.rough_gait, self.conditions)
         loaded = self.load_policies((self.flat_gait, self.rough_gait))
         path = self.out / TABLE
-        check_table_folder(path, overwrite=self.overwrite)
-        table = ResumableTable.open(
-            path,
-            COLUMNS,
-            "crossings",
-            key=("amplitude", "way"),
-            same={"seed": self.seed, "runs": self.runs},
-            overwrite=self.overwrite,
-        )
-
-        def crossed(way: Strategy, amplitude: float, report: Report) -> Row:
-            crossings = cross(
-                loaded, way, amplitude=amplitude, runs=self.runs, seed=self.seed, report=report
+        with only_writer(self.out):
+            check_table_folder(path, overwrite=self.overwrite)
+            table = ResumableTable.open(
+                path,
+                COLUMNS,
+                "crossings",
+                key=("amplitude", "way"),
+                same={"seed": self.seed, "runs": self.runs},
+                overwrite=self.overwrite,
             )
-            return row_of(way, amplitude, self.seed, crossings)
 
-        parts = [
-            table.part(
-                (amplitude, way.name),
-                f"{way.name} at {amplitude:g} m",
-                partial(crossed, way, amplitude),
-            )
-            for amplitude in self.amplitudes
-            for way in every
-        ]
-        run_missing(parts, progress=progress, say=say)
-        rows = table.rows
-        from gaitshift.show.plots.studies import crossings_figure  # matplotlib is slow to import
+            def crossed(way: Strategy, amplitude: float, report: Report) -> Row:
+                crossings = cross(
+                    loaded, way, amplitude=amplitude, runs=self.runs, seed=self.seed, report=report
+                )
+                return row_of(way, amplitude, self.seed, crossings)
 
-        crossings_figure(rows, self.out / PICTURE)
-        command = shlex.join(["gaitshift", *sys.argv[1:]])
-        (self.out / README).write_text(page(rows, command), encoding="utf-8")
+            parts = [
+                table.part(
+                    (amplitude, way.name),
+                    f"{way.name} at {amplitude:g} m",
+                    partial(crossed, way, amplitude),
+                )
+                for amplitude in self.amplitudes
+                for way in every
+            ]
+            run_missing(parts, progress=progress, say=say)
+            rows = table.rows
+            # Here, because matplotlib is slow to import.
+            from gaitshift.show.plots.studies import crossings_figure
+
+            crossings_figure(rows, self.out / PICTURE)
+            command = shlex.join(["gaitshift", *sys.argv[1:]])
+            write_text(self.out / README, page(rows, command))
         if self.json:
             emit_json({"out": str(self.out), "crossings": rows})
         else:

@@ -3,7 +3,9 @@
 import shlex
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,6 +17,7 @@ from gaitshift.cli.output import emit_json
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import divergence_log, flat_verdict
 
@@ -57,14 +60,16 @@ class Train(RobotOption):
 
     def run(self) -> None:
         """Trains, with a progress bar."""
-        run = self._open()
-        bar = _Bar(run)
-        try:
-            with bar:
-                path = run.train(bar, bar.judge, bar.keep)
-        except KeyboardInterrupt as stop:
-            command = f"gaitshift train --resume {run.folder}"
-            raise type(stop)(f"interrupted; continue with: {command}") from None
+        folder, begin = self._beginning()
+        with only_writer(folder):
+            run = begin(folder)
+            bar = _Bar(run)
+            try:
+                with bar:
+                    path = run.train(bar, bar.judge, bar.keep)
+            except KeyboardInterrupt as stop:
+                command = f"gaitshift train --resume {folder}"
+                raise type(stop)(f"interrupted; continue with: {command}") from None
         if self.json:
             emit_json({**bar.row, "verdict": bar.verdict or None, "policy": str(path)})
             return
@@ -72,7 +77,8 @@ class Train(RobotOption):
             print(f"{_spell(bar.verdict)}, {bar.verdict['misses'] or 'no limit missed'}")
         print(f"policy written to {path}; evaluate it with: gaitshift evaluate {path}")
 
-    def _open(self) -> "Run":
+    def _beginning(self) -> tuple[Path, "Callable[[Path], Run]"]:
+        """The folder of the run, and what begins or resumes it there."""
         try:
             from gaitshift.learn.recipe import PRESETS
             from gaitshift.learn.run import Run
@@ -81,18 +87,10 @@ class Train(RobotOption):
                 f"training needs the package '{error.name}'; install gaitshift[train]"
             ) from error
         if self.resume is not None:
-            for field in fields(Train):
-                if (
-                    field.name not in ("resume", "json")
-                    and getattr(self, field.name) != field.default
-                ):
-                    option = (
-                        "--" + field.name.replace("_", "-") if field.name != "gait" else "a gait"
-                    )
-                    raise GaitshiftError(
-                        f"{option} must not be given with --resume, which has its own settings"
-                    )
-            return Run.resume(self.resume)
+            self._refuse_settings()
+            if not self.resume.is_dir():
+                raise GaitshiftError(f"{self.resume} is not a training run: it is not a folder")
+            return self.resume, Run.resume
         if self.gait is None:
             known = ", ".join(gaits.names())
             raise GaitshiftError(
@@ -109,15 +107,24 @@ class Train(RobotOption):
         if self.iterations is not None:
             recipe = recipe.with_iterations(self.iterations)
         folder = self.out or Path("runs") / f"{machine.name}-{self.seed}"
-        return Run.create(
-            folder,
-            machine,
-            recipe,
+        return folder, partial(
+            Run.create,
+            machine=machine,
+            recipe=recipe,
             seed=self.seed,
             command=shlex.join(["gaitshift", *sys.argv[1:]]),
             robot=robot,
             overwrite=self.overwrite,
         )
+
+    def _refuse_settings(self) -> None:
+        for field in fields(Train):
+            if field.name in ("resume", "json") or getattr(self, field.name) == field.default:
+                continue
+            option = "a gait" if field.name == "gait" else f"--{field.name.replace('_', '-')}"
+            raise GaitshiftError(
+                f"{option} must not be given with --resume, which has its own settings"
+            )
 
 
 def _spell(verdict: "Row") -> str:

@@ -21,9 +21,11 @@ from gaitshift.cli.output import (
 )
 from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.resume import Report, ResumableTable, run_missing
 from gaitshift.sim.terrain import from_spec
 from gaitshift.table import Row
+from gaitshift.whole_file import write_text
 
 TABLE, PAGE = "transitions.csv", "page.html"
 
@@ -69,44 +71,45 @@ class Transitions(RobotOptions):
         for ground in self.grounds:
             from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # checks all specs first
         path = self.out / TABLE
-        check_table_folder(path, overwrite=self.overwrite)
-        table = ResumableTable.open(
-            path,
-            COLUMNS,
-            "shifts",
-            key=("old", "new", "ground"),
-            same={"seed": self.seed, "switches": self.switches},
-            overwrite=self.overwrite,
-        )
-
-        def shifted(pair: Pair, ground: str, report: Report) -> Row:
-            outcomes = run_pair(
-                loaded,
-                pair,
-                ground=ground,
-                switches=self.switches,
-                seed=self.seed,
-                report=report,
+        with only_writer(self.out):
+            check_table_folder(path, overwrite=self.overwrite)
+            table = ResumableTable.open(
+                path,
+                COLUMNS,
+                "shifts",
+                key=("old", "new", "ground"),
+                same={"seed": self.seed, "switches": self.switches},
+                overwrite=self.overwrite,
             )
-            return row_of(pair, ground, self.seed, outcomes)
 
-        parts = [
-            table.part(
-                (old, new, ground),
-                f"{old} to {new} on {ground}",
-                partial(shifted, Pair(old, new), ground),
-            )
-            for ground in self.grounds
-            for old, new in permutations(names, 2)
-        ]
-        run_missing(parts, progress=progress, say=say)
-        rows = table.rows
-        self._draw(rows)
-        command = shlex.join(["gaitshift", *sys.argv[1:]])
-        (self.out / README).write_text(page(rows, command), encoding="utf-8")
-        from gaitshift.show.report.study_pages import write_transition_page
+            def shifted(pair: Pair, ground: str, report: Report) -> Row:
+                outcomes = run_pair(
+                    loaded,
+                    pair,
+                    ground=ground,
+                    switches=self.switches,
+                    seed=self.seed,
+                    report=report,
+                )
+                return row_of(pair, ground, self.seed, outcomes)
 
-        write_transition_page(rows, self.out / PAGE, command=command)
+            parts = [
+                table.part(
+                    (old, new, ground),
+                    f"{old} to {new} on {ground}",
+                    partial(shifted, Pair(old, new), ground),
+                )
+                for ground in self.grounds
+                for old, new in permutations(names, 2)
+            ]
+            run_missing(parts, progress=progress, say=say)
+            rows = table.rows
+            self._draw(rows)
+            command = shlex.join(["gaitshift", *sys.argv[1:]])
+            write_text(self.out / README, page(rows, command))
+            from gaitshift.show.report.study_pages import write_transition_page
+
+            write_transition_page(rows, self.out / PAGE, command=command)
         if self.json:
             emit_json({"out": str(self.out), "transitions": rows})
         else:

@@ -14,6 +14,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait.elements import State, Transition, feet_text
 from gaitshift.gait.machine import RewardMachine
 from gaitshift.robot.legs import LEGS
+from gaitshift.whole_file import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +69,8 @@ def draw(machine: RewardMachine, path: Path) -> None:
         for edge, bulge in _bulges(machine.edges):
             _draw_edge(axes, edge, cards, middles, bulge)
         undated = {"Date": None} if path.suffix.lower() == ".svg" else None
-        figure.savefig(path, dpi=160, metadata=undated)
+        with replacing(path) as part:
+            figure.savefig(part, format=path.suffix[1:], dpi=160, metadata=undated)
 
 
 def layout(machine: RewardMachine) -> dict[str, tuple[float, float]]:

@@ -13,6 +13,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.log_check import check_names, checked
 from gaitshift.lab.npz import arrays_in
 from gaitshift.robot.state import Batch, Privileged, Proprioception
+from gaitshift.whole_file import replacing
 
 FORMAT_VERSION = 2
 """Increased when an earlier file could be misread. 1 (gaitshift 0.1) held MuJoCo's qpos, qvel."""
@@ -92,7 +93,6 @@ class Log(Batch):
 
     def save(self, path: Path) -> None:
         """Writes a compressed npz file, whole or not at all."""
-        part = path.with_suffix(".part.npz")
         values: dict[str, Any] = {"format_version": FORMAT_VERSION}
         for name in _types():
             value: Any = self
@@ -100,8 +100,8 @@ class Log(Batch):
                 value = getattr(value, attribute)
             if value is not None:
                 values[name] = np.asarray(value)
-        np.savez_compressed(part, **values)
-        part.replace(path)
+        with replacing(path) as part, part.open("wb") as file:
+            np.savez_compressed(file, **values)
 
     @classmethod
     def load(cls, path: Path) -> "Log":

@@ -14,6 +14,7 @@ from rsl_rl.modules import EmpiricalNormalization
 from gaitshift.control.policy_info import PolicyInfo
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.sim.env import GaitEnv
+from gaitshift.whole_file import replacing
 
 OPSET = 18
 """ONNX operator set; every recent onnxruntime reads it."""
@@ -78,9 +79,8 @@ def write(
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=9)
     helper.set_model_props(model, info.to_metadata())
     onnx.checker.check_model(model)
-    part = path.with_suffix(".part")
-    onnx.save(model, str(part))
-    part.replace(path)
+    with replacing(path) as part:
+        onnx.save(model, str(part))
 
 
 def _normalizer(model: MLPModel) -> EmpiricalNormalization | None:

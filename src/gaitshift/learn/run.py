@@ -19,6 +19,7 @@ from torch.utils.tensorboard import SummaryWriter
 from gaitshift import table
 from gaitshift.data import json_in, located
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import LOCK
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
 from gaitshift.learn.ground import FIELD, draw_grounds
@@ -31,9 +32,13 @@ from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.sim.world import Divergence
 from gaitshift.table import Row
+from gaitshift.whole_file import PART, flush_to_disk, replacing, write_text
 
 CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
 PROGRESS, VERDICTS, DIVERGED = "progress.csv", "verdicts.csv", "diverged"
+
+_CONFIG_START = b'{\n  "command": '
+"""How each of our config files begins."""
 
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
@@ -96,8 +101,8 @@ class Run:
         robot: Robot = ANYMAL_B,
         overwrite: bool = False,
     ) -> "Run":
-        """A new run in a new folder."""
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        """A new run in a new folder, or in the folder of a run that has no checkpoint yet."""
+        if folder.exists() and not (folder.is_dir() and _is_barely_begun(folder)):
             if not overwrite:
                 raise GaitshiftError(
                     f"{folder} exists and is not empty; give another --out, --overwrite, "
@@ -116,8 +121,7 @@ class Run:
         if robot != ANYMAL_B:
             config["robot"] = to_dict(robot)
         # First, so that a folder that a kill left unfinished still shows what it is.
-        (folder / CONFIG).write_text(json.dumps(config, indent=2) + "\n", encoding="utf-8")
-        (folder / CHECKPOINTS).mkdir(exist_ok=True)
+        write_text(folder / CONFIG, json.dumps(config, indent=2) + "\n")
         run._save_checkpoint()
         return run
 
@@ -141,9 +145,12 @@ class Run:
         except GaitshiftError as error:
             raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
         checkpoints = run._checkpoints()
-        if not checkpoints:
+        if checkpoints:
+            run._load_checkpoint(checkpoints[-1])
+        elif _is_barely_begun(folder):
+            run._save_checkpoint()
+        else:
             raise GaitshiftError(f"{folder / CHECKPOINTS} has no checkpoint to resume from")
-        run._load_checkpoint(checkpoints[-1])
         return run
 
     def train(
@@ -259,15 +266,18 @@ class Run:
 
     def _save_checkpoint(self) -> None:
         path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
-        part = path.with_suffix(".part")
+        path.parent.mkdir(exist_ok=True)
         state: dict[str, Any] = {
             "iteration": self.iteration,
             "wall_s": self._wall,
             "torch_rng": torch.get_rng_state(),
             "ppo": self.learner.ppo.save(),
         }
-        torch.save(state, part)
-        part.replace(path)
+        for name in (PROGRESS, VERDICTS):  # their rows up to a checkpoint are never repeated
+            if (self.folder / name).is_file():
+                flush_to_disk(self.folder / name)
+        with replacing(path) as part:
+            torch.save(state, part)
 
     def _load_checkpoint(self, path: Path) -> None:
         state = _read_checkpoint(path)
@@ -336,8 +346,23 @@ def _versions() -> dict[str, str]:
     return {"python": platform.python_version(), **{name: version(name) for name in packages}}
 
 
+def _is_barely_begun(folder: Path) -> bool:
+    """Whether a run ended in this folder before its first checkpoint, or nothing is in it."""
+    if {path.name for path in folder.iterdir()} - {CONFIG, CONFIG + PART, CHECKPOINTS, LOCK}:
+        return False
+    if any(path.suffix != PART for path in (folder / CHECKPOINTS).glob("*")):
+        return False
+    config = folder / CONFIG
+    text = config.read_bytes()[: len(_CONFIG_START)] if config.is_file() else b""
+    return _CONFIG_START.startswith(text)
+
+
 def _clear(folder: Path) -> None:
     """Deletes the folder of an earlier run; `GaitshiftError` where the folder holds no run."""
     if not (folder / CONFIG).is_file():
         raise GaitshiftError(f"{folder} is not a training run and is not overwritten")
-    shutil.rmtree(folder)
+    for path in folder.iterdir():
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        elif path.name != LOCK:
+            path.unlink()

@@ -1,12 +1,12 @@
 """An upper bound: gradient boosting on windows of the signals of the conditions."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 from zlib import crc32
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from sklearn.ensemble import HistGradientBoostingClassifier
 from threadpoolctl import threadpool_limits
 
@@ -44,10 +44,65 @@ _STATISTICS: tuple[AnyStatistic, ...] = (
 _WINDOWS = (0.5, 2.0)
 """Lengths of the windows whose means are inputs too [s]."""
 
+_PER_STATISTIC = 1 + len(_WINDOWS)
+"""Inputs of each statistic."""
+
 _EVERY = 5
 """It is evaluated at every fifth step; its output is constant in between."""
 
 _SEED = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Examples:
+    """Inputs and labels at K steps of the robots of some recordings."""
+
+    statistics: list[int]
+    """Numbers in `_STATISTICS` of those whose signals the recordings have."""
+    inputs: Float[np.ndarray, "K F"]
+    """Inputs, three a statistic."""
+    is_rough: Bool[np.ndarray, " K"]
+    """Labels."""
+    robot: Int[np.ndarray, " K"]
+    """Numbers of the robots, from 0."""
+    robots: int
+    """Robots of all recordings."""
+    first: list[list[int]]
+    """Key of each recording, and number of its first robot."""
+
+    @classmethod
+    def of(cls, recordings: Iterable[LabelledRun]) -> "Examples":
+        """The examples in recordings with the same signals; robots that have fallen give none."""
+        statistics: list[int] = []
+        inputs, is_rough = [np.empty((0, 0), np.float32)], [np.empty(0, bool)]
+        robot, first, count = [np.empty(0, int)], list[list[int]](), 0
+        for recording in recordings:
+            if not first:
+                statistics = _fed_by(recording)
+                inputs = [np.empty((0, len(statistics) * _PER_STATISTIC), np.float32)]
+            seen = _features(recording, [_STATISTICS[i] for i in statistics])
+            rough, alive = recording.rough[::_EVERY], recording.alive[::_EVERY]
+            first.append([_key(recording), count])
+            for one in range(recording.robots):
+                standing = alive[:, one]
+                inputs.append(seen[standing, one])
+                is_rough.append(rough[standing, one])
+                robot.append(np.full(np.count_nonzero(standing), count))
+                count += 1
+        return cls(
+            statistics=statistics,
+            inputs=np.concatenate(inputs),
+            is_rough=np.concatenate(is_rough),
+            robot=np.concatenate(robot),
+            robots=count,
+            first=first,
+        )
+
+    def inputs_of(self, statistics: Sequence[int]) -> Float[np.ndarray, "K G"]:
+        """The inputs of some of the statistics."""
+        by_statistic = self.inputs.reshape(len(self.inputs), -1, _PER_STATISTIC)
+        chosen = by_statistic[:, [self.statistics.index(i) for i in statistics]]
+        return chosen.reshape(len(self.inputs), -1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,35 +118,40 @@ class RoughnessClassifier:
 
     @classmethod
     def fit(cls, recordings: Iterable[LabelledRun]) -> "RoughnessClassifier":
-        """Learns rough from smooth ground.
+        """Learns rough from smooth ground; errors as in `learn`."""
+        return cls.learn([Examples.of(recordings)])
+
+    @classmethod
+    def learn(cls, examples: Sequence[Examples]) -> "RoughnessClassifier":
+        """Learns from the examples of several logs; the same examples give the same classifier.
 
         Raises:
-            GaitshiftError: all labels are the same.
+            GaitshiftError: there are fewer than two robots, or all labels are the same.
         """
-        features: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
-        labels: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
-        statistics: tuple[AnyStatistic, ...] = ()
-        halves: dict[int, int] = {}
-        count = 0
-        for recording in recordings:
-            statistics = statistics or _fed_by(recording)
-            seen = _features(recording, statistics)
-            rough, alive = recording.rough[::_EVERY], recording.alive[::_EVERY]
-            halves[_key(recording)] = count % 2
-            for robot in range(recording.robots):
-                half, standing = count % 2, alive[:, robot]
-                count += 1
-                features[half].append(seen[standing, robot])
-                labels[half].append(rough[standing, robot])
-        if not (features[0] and features[1]):
+        some = [one for one in examples if one.robots]
+        before = np.cumsum([0, *(one.robots for one in some)])
+        if before[-1] < 2:
             raise GaitshiftError(
                 "a classifier needs two robots or more, or several passages of one"
             )
-        models = tuple(
-            _fitted(np.concatenate(x), np.concatenate(y))
-            for x, y in zip(features, labels, strict=True)
+        everywhere = [
+            number
+            for number in range(len(_STATISTICS))
+            if all(number in one.statistics for one in some)
+        ]
+        inputs = np.concatenate([one.inputs_of(everywhere) for one in some])
+        is_rough = np.concatenate([one.is_rough for one in some])
+        half = np.concatenate([one.robot + n for one, n in zip(some, before, strict=False)]) % 2
+        first, second = (_fitted(inputs[half == i], is_rough[half == i]) for i in (0, 1))
+        return cls(
+            statistics=tuple(_STATISTICS[i] for i in everywhere),
+            models=(first, second),
+            halves={
+                key: int(number + n) % 2
+                for one, n in zip(some, before, strict=False)
+                for key, number in one.first
+            },
         )
-        return cls(statistics=statistics, models=cast(Any, models), halves=halves)
 
     def probability(self, recording: LabelledRun, *, crosswise: bool) -> Float[np.ndarray, "T N 1"]:
         """Probability of rough ground, by both models, or by the one that has not seen the robot.
@@ -120,12 +180,13 @@ class RoughnessClassifier:
         )
 
 
-def _fed_by(recording: LabelledRun) -> tuple[AnyStatistic, ...]:
-    return tuple(
-        s
-        for s in _STATISTICS
-        if all(getattr(recording.sensed, name) is not None for name in s.needs)
-    )
+def _fed_by(recording: LabelledRun) -> list[int]:
+    """Numbers of the statistics whose signals a recording has."""
+    return [
+        number
+        for number, statistic in enumerate(_STATISTICS)
+        if all(getattr(recording.sensed, name) is not None for name in statistic.needs)
+    ]
 
 
 def _key(recording: LabelledRun) -> int:
@@ -133,7 +194,7 @@ def _key(recording: LabelledRun) -> int:
 
 
 def _features(
-    recording: LabelledRun, statistics: tuple[AnyStatistic, ...]
+    recording: LabelledRun, statistics: Sequence[AnyStatistic]
 ) -> Float[np.ndarray, "S N F"]:
     """Inputs of the classifier at every fifth step; NaN where nothing is known yet."""
     columns: list[np.ndarray] = []

@@ -15,6 +15,7 @@ from gaitshift.lab.identification.passage import LENGTH
 from gaitshift.lab.identification.statistics import poisson, wilson
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.table import Row
+from gaitshift.whole_file import write_text
 
 README, CONDITIONS, COURSES = FILES = ("README.md", "conditions.csv", "courses.csv")
 
@@ -56,9 +57,7 @@ def write_report(
     conditions, courses = condition_rows(judged), course_rows(judged)
     for name, rows in ((CONDITIONS, conditions), (COURSES, courses)):
         table.write(out / name, rows)
-    (out / README).write_text(
-        _readme(judged, conditions, courses, command, held_out, pictures), encoding="utf-8"
-    )
+    write_text(out / README, _readme(judged, conditions, courses, command, held_out, pictures))
     return conditions
 
 

@@ -1,79 +1,19 @@
 """Identification from files: conditions tuned on some logs and judged on others, step by step."""
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar, cast
-
-from joblib import Memory
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.identification.candidates import CANDIDATES, Candidate, candidates
-from gaitshift.lab.identification.classifier import NAME, RoughnessClassifier
+from gaitshift.lab.identification.classifier import NAME, Examples, RoughnessClassifier
 from gaitshift.lab.identification.judging import Judged, Replayed, judge, replay_rules
+from gaitshift.lab.identification.kept import EXAMPLES, REPLAYED, TRIED
 from gaitshift.lab.identification.labelled_run import Way
 from gaitshift.lab.identification.log_files import check_sources, recordings
+from gaitshift.lab.identification.step_cache import Stamp, StepCache, stamp
 from gaitshift.lab.identification.tuning import Tried, Tuned, as_given, try_grids, tune
-
-PACKAGE = Path(__file__).parents[2]
-"""Folder of the code on which cached results depend."""
-
-Found = TypeVar("Found")
-Stamp = tuple[str, int, int]
-
-
-class StepCache:
-    """Steps of a task, each done once, even if the process ends in between.
-
-    A step is repeated if its inputs or the code of this package have changed.
-    """
-
-    def __init__(self, folder: Path, report: Callable[[str], None]) -> None:
-        """Caches results in `folder`; `report` is called with the name of each step."""
-        self._folder = folder
-        self._code = _code()
-        self._report = report
-
-    @cached_property
-    def _step(self) -> Any:
-        """Created at the first step, so that an error before it leaves no new folder."""
-        memory = cast(Any, Memory)(self._folder, verbose=0, compress=1)
-        return memory.cache(_do, ignore=["work"])
-
-    def get(self, name: str, depends_on: Sequence[Any], work: Callable[[], Found]) -> Found:
-        """The result of a step, from the cache if it is there.
-
-        Args:
-            name: passed to `report`.
-            depends_on: names, numbers and stamps of files: all inputs of the step.
-            work: computes the result.
-        """
-        key = (self._code, name, *depends_on)
-        known = self._step.check_call_in_cache(work, key)
-        self._report(f"{name} (cached)" if known else name)
-        return self._step(work, key)
-
-
-def stamp(path: Path) -> Stamp:
-    """A stamp that differs between files, and between versions of a file."""
-    status = path.stat()
-    return str(path.resolve()), status.st_size, status.st_mtime_ns
-
-
-def _do(work: Callable[[], Any], key: tuple[Any, ...]) -> Any:
-    del key
-    return work()
-
-
-def _code() -> str:
-    """Fingerprint of this package's code: results of other code are not reused."""
-    fingerprint = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
-        fingerprint.update(path.read_bytes())
-    return fingerprint.hexdigest()
-
 
 ALL = "all"
 """Stands for every condition whose signals are in the logs."""
@@ -133,6 +73,12 @@ class Task:
         return CANDIDATES if self.everything else named
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the conditions, with that of the classifier where it may be among them."""
+        classifier = (NAME,) if self.everything or NAME in self.conditions else ()
+        return (*(candidate.name for candidate in self.wanted), *classifier)
+
+    @property
     def judges(self) -> tuple[Path, ...]:
         """Logs for judging."""
         return self.held_out or self.logs
@@ -146,7 +92,7 @@ class Task:
         """
         cache = StepCache(folder, report)
         learned = tuple(map(stamp, self.logs))
-        classifier = self._fitted(cache, learned, report)
+        classifier = self._fitted(cache, report)
         if classifier is None:
             learned = ()
         tuned = self._tuned(cache, classifier, learned)
@@ -158,18 +104,22 @@ class Task:
         for log in self.judges:
             work = partial(_replay, tuned, log, self.way)
             about = (self.way, rules, learned, stamp(log))
-            replayed.join(cache.get(f"judging: {log.stem}", about, work))
+            replayed.join(cache.get(f"judging: {log.stem}", about, REPLAYED, work))
         return judge(tuned, replayed)
 
     def _fitted(
-        self, cache: StepCache, learned: tuple[Stamp, ...], report: Callable[[str], None]
+        self, cache: StepCache, report: Callable[[str], None]
     ) -> RoughnessClassifier | None:
-        """The classifier, where it is compared and can learn."""
-        if not self.everything and NAME not in self.conditions:
+        """The classifier, where it is compared and can learn; fitted anew to the kept examples."""
+        if NAME not in self.names:
             return None
-        work = partial(_fit, self.logs, self.way)
+        examples: list[Examples] = []
+        for log in self.logs:
+            work, about = partial(_examples, log, self.way), (self.way, stamp(log))
+            examples.append(cache.get(f"learning from: {log.stem}", about, EXAMPLES, work))
+        report("fitting the classifier")
         try:
-            return cache.get("fitting the classifier", (self.way, learned), work)
+            return RoughnessClassifier.learn(examples)
         except GaitshiftError as error:
             if not self.everything:
                 raise
@@ -189,7 +139,7 @@ class Task:
         for log in self.logs:
             work = partial(_try, wanted, log, self.way)
             about = (self.way, names, learned, stamp(log))
-            tried.join(cache.get(f"choosing: {log.stem}", about, work))
+            tried.join(cache.get(f"choosing: {log.stem}", about, TRIED, work))
         tuned = tune(wanted, tried)
         found = {one.candidate.name for one in tuned}
         left_out = [name for name in names if name not in found]
@@ -201,8 +151,8 @@ class Task:
         return tuned
 
 
-def _fit(logs: Sequence[Path], way: Way) -> RoughnessClassifier:
-    return RoughnessClassifier.fit(recordings(logs, way))
+def _examples(log: Path, way: Way) -> Examples:
+    return Examples.of(recordings([log], way))
 
 
 def _try(wanted: Sequence[Candidate], log: Path, way: Way) -> Tried:

@@ -18,9 +18,11 @@ from gaitshift import table
 from gaitshift.control import policy
 from gaitshift.data import json_in
 from gaitshift.errors import GaitshiftError
+from gaitshift.folder_lock import only_writer
 from gaitshift.lab.reproduction.plan import Job
 from gaitshift.learn.learner import DivergedError
 from gaitshift.learn.run import CHECKPOINTS, CONFIG, POLICY, PROGRESS, Run
+from gaitshift.whole_file import write_text
 
 FAILED = "failed.txt"
 """File in the folder of a diverged run, with the error."""
@@ -44,11 +46,12 @@ def train(job: Job, folder: Path) -> None:
     A diverged run leaves `failed.txt` and its results so far; it counts as a result and does not
     stop the other runs. Any other error (such as a full disk) is raised; the same call resumes.
     """
-    run = Run.resume(folder) if _started(folder) else _create(job, folder)
-    try:
-        run.train()
-    except DivergedError as error:
-        (folder / FAILED).write_text(f"{error}\n", encoding="utf-8")
+    with only_writer(folder):
+        run = Run.resume(folder) if _started(folder) else _create(job, folder)
+        try:
+            run.train()
+        except DivergedError as error:
+            write_text(folder / FAILED, f"{error}\n")
 
 
 def iterations_done(folder: Path) -> int:

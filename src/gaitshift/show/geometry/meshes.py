@@ -2,6 +2,7 @@
 
 import io
 import os
+import zipfile
 from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ import trimesh
 from jaxtyping import Float, Int
 
 from gaitshift.robot.description import Robot
+from gaitshift.whole_file import replacing
 
 _LEGS = {"LF": "FL", "RF": "FR", "LH": "BL", "RH": "BR"}
 """Names of the legs in the URDF, and here."""
@@ -162,7 +164,7 @@ def _parts(robot: Robot) -> list[Part]:
     if cache.is_file():
         try:
             return _read(cache)
-        except (OSError, ValueError, KeyError):
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile):
             pass  # damaged: made anew
     parts = convert(urdf)
     try:
@@ -199,9 +201,8 @@ def _write(path: Path, parts: list[Part]) -> None:
         arrays[f"vertices_{number}"] = part.vertices.astype(np.float32)
         arrays[f"faces_{number}"] = part.faces.astype(np.int32)
         arrays[f"colour_{number}"] = part.colour
-    unfinished = path.with_suffix(f".{os.getpid()}.npz")
-    np.savez_compressed(unfinished, **arrays)
-    unfinished.replace(path)
+    with replacing(path) as part, part.open("wb") as file:
+        np.savez_compressed(file, **arrays)
 
 
 def _read(path: Path) -> list[Part]:

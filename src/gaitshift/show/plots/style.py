@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.whole_file import replacing
 
 INK, QUIET, PALE, PAPER = "#1f2933", "#616e7c", "#e4e7eb", "#ffffff"
 """Colours of text and lines, of secondary text, of grids, and of the background."""
@@ -121,15 +122,16 @@ def save(figure: Figure, path: Path) -> None:
     """Writes the figure, the same bytes for the same figure; a PNG in 256 colours, to be small."""
     ending = path.suffix.lower()
     if ending != ".png":
-        figure.savefig(
-            path, metadata={"Date": None} if ending == ".svg" else {"CreationDate": None}
-        )
+        undated = {"Date": None} if ending == ".svg" else {"CreationDate": None}
+        with replacing(path) as part:
+            figure.savefig(part, format=ending[1:], metadata=undated)
         return
     pixels = BytesIO()
     figure.savefig(pixels, format="png", dpi=DPI)
     with Image.open(pixels) as image:
         few = image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-        few.save(path, optimize=True)
+        with replacing(path) as part:
+            few.save(part, format="PNG", optimize=True)
 
 
 def name_row(axes: Axes, label: str) -> None:

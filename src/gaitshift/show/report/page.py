@@ -8,6 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from gaitshift.whole_file import write_text
+
 Row = tuple[Sequence[str], float | None]
 """Cells of a row, and the time to which a click on it seeks [s]."""
 
@@ -54,10 +56,7 @@ def write_page(
         "SCRIPT": _read("player.js" if walks else "figures.js").replace("</script", "<\\/script"),
     }
     # In one pass, so that a place in the text that is put in is not taken for one of the page.
-    text = re.sub(r"@([A-Z]+)@", lambda place: parts[place[1]], _read("page.html"))
-    part = path.with_suffix(".part")
-    part.write_text(text, encoding="utf-8")
-    part.replace(path)
+    write_text(path, re.sub(r"@([A-Z]+)@", lambda place: parts[place[1]], _read("page.html")))
 
 
 def figure(name: str) -> str:

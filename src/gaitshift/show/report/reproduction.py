@@ -27,6 +27,7 @@ from gaitshift.lab.reproduction.results import (
 )
 from gaitshift.show.plots import reproduction as figures
 from gaitshift.table import Row, markdown, write
+from gaitshift.whole_file import write_text
 
 README = "README.md"
 
@@ -68,7 +69,7 @@ def write_report(
     for name in written:
         write(out / name, parts[name])
     written += figures.draw(results, judged, out)
-    (out / README).write_text(_readme(results, found, judged, ablations, written), encoding="utf-8")
+    write_text(out / README, _readme(results, found, judged, ablations, written))
     return {
         "out": str(out),
         "files": [README, *written],

@@ -1,7 +1,9 @@
 """A log as an MP4 file: the robot on its ground, and the signals of the shift condition below."""
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from types import TracebackType
 from typing import Any, cast
 
 import imageio_ffmpeg
@@ -27,6 +29,7 @@ from gaitshift.show.plots.style import gait_colours
 from gaitshift.show.video.canvas import Ball, Canvas, VideoUnavailable, follow
 from gaitshift.show.video.scene import Paint, build_scene
 from gaitshift.show.video.strip import Reading, Strip
+from gaitshift.whole_file import replacing
 
 _QUALITY = 25
 """x264's constant rate factor."""
@@ -39,10 +42,11 @@ class FilmWriter:
     """Writes pictures of one size into an MP4 file, whole or not at all; a context manager."""
 
     def __init__(self, path: Path, width: int, height: int, fps: int) -> None:
-        self._path, self._part = path, path.with_suffix(".part.mp4")
+        self._path, self._file = path, ExitStack()
+        part = self._file.enter_context(replacing(path))
         try:
             self._frames = imageio_ffmpeg.write_frames(
-                str(self._part),
+                str(part),
                 (width, height),
                 fps=fps,
                 codec="libx264",
@@ -50,7 +54,8 @@ class FilmWriter:
                 macro_block_size=2,
                 quality=cast(Any, None),
                 output_params=[
-                    *("-preset", "veryfast", "-crf", str(_QUALITY), "-movflags", "+faststart"),
+                    *("-f", "mp4", "-movflags", "+faststart"),
+                    *("-preset", "veryfast", "-crf", str(_QUALITY)),
                     *("-maxrate", f"{_RATE}k", "-bufsize", f"{2 * _RATE}k"),
                 ],
             )
@@ -71,12 +76,14 @@ class FilmWriter:
     def __enter__(self) -> "FilmWriter":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._frames.close()
-        if kind is None:
-            self._part.replace(self._path)
-        else:
-            self._part.unlink(missing_ok=True)
+        self._file.__exit__(kind, error, trace)
 
 
 _GLOW = 1.3
