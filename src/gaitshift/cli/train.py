@@ -35,6 +35,10 @@ class Train(RobotOption):
     preset: Literal["default", "two-stage", "paper"] = "default"
     """Training recipe: default; two-stage, without the last stage; or paper (Table I,
     30 robots, Kp 3, Kd 0.2, flat ground)."""
+    recipe: Path | None = None
+    """TOML file of settings that differ from the preset, such as [ppo] and epochs = 3."""
+    settings: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="NAME=VALUE")] = ()
+    """Settings that differ from preset and file: reward.power=-0.05 stages.flat.iterations=200"""
     robots: int | None = None
     """Number of robots in parallel; by default that of the recipe."""
     iterations: int | None = None
@@ -74,14 +78,16 @@ class Train(RobotOption):
         try:
             from gaitshift.learn.recipe import PRESETS
             from gaitshift.learn.run import Run
+            from gaitshift.learn.settings import differences, with_file, with_settings
         except ImportError as error:
             raise GaitshiftError(
                 f"training needs the package '{error.name}'; install gaitshift[train]"
             ) from error
         if self.resume is not None:
-            if self.gait is not None or self.robot_file is not None:
+            if self.gait or self.robot_file or self.recipe or self.settings:
                 raise GaitshiftError(
-                    "a gait and --robot-file must not be given with --resume, which has its own"
+                    "a gait, --robot-file, --recipe and --set must not be given with --resume, "
+                    "which has its own"
                 )
             return Run.resume(self.resume)
         if self.gait is None:
@@ -92,7 +98,12 @@ class Train(RobotOption):
         if self.seed < 0:
             raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         machine, robot = gaits.load(self.gait), self.read_robot()
-        recipe = PRESETS[self.preset]()
+        default = recipe = PRESETS[self.preset]()
+        if self.recipe is not None:
+            recipe = with_file(recipe, self.recipe)
+        recipe = with_settings(recipe, self.settings)
+        for name, (value, usual) in differences(recipe, default).items():
+            say(f"{name} is {value} (preset {self.preset}: {usual})")
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)
         if self.threads is not None:
