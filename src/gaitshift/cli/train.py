@@ -37,17 +37,21 @@ class Train(RobotOption):
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
     """Name of a gait (see `gaitshift gaits`) or a machine file (.toml)."""
-    preset: Literal["default", "two-stage", "paper"] = "default"
+    preset: Literal["default", "two-stage", "paper"] | None = None
     """Training recipe: default; two-stage, without the last stage; or paper (Table I,
-    30 robots, Kp 3, Kd 0.2, flat ground)."""
+    30 robots, Kp 3, Kd 0.2, flat ground). If not given: default."""
+    recipe: Path | None = None
+    """TOML file of settings that differ from the preset, such as [ppo] and epochs = 3."""
+    settings: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="NAME=VALUE")] = ()
+    """Settings that differ from preset and file: reward.power=-0.05 stages.flat.iterations=200"""
     robots: int | None = None
     """Number of robots in parallel; by default that of the recipe."""
     iterations: int | None = None
     """Total number of PPO iterations; by default that of the recipe."""
     threads: int | None = None
     """Number of torch threads; by default that of the recipe. Use 1 for parallel trainings."""
-    seed: int = 0
-    """Seed of networks, exploration, terrains and pushes."""
+    seed: int | None = None
+    """Seed of networks, exploration, terrains and pushes; 0 by default."""
     out: Path | None = None
     """Folder of the run; runs/GAIT-SEED by default."""
     resume: Path | None = None
@@ -82,6 +86,7 @@ class Train(RobotOption):
         try:
             from gaitshift.learn.recipe import PRESETS
             from gaitshift.learn.run import Run
+            from gaitshift.learn.settings import differences, with_settings
         except ImportError as error:
             raise GaitshiftError(
                 f"training needs the package '{error.name}'; install gaitshift[train]"
@@ -96,22 +101,27 @@ class Train(RobotOption):
             raise GaitshiftError(
                 f"gait must be one of {known}, or a .toml file, got none; or give --resume DIR"
             )
-        if self.seed < 0:
-            raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
+        seed = self.seed or 0
+        if seed < 0:
+            raise GaitshiftError(f"seed must be 0 or larger, got {seed}")
         machine, robot = gaits.load(self.gait), self.read_robot()
-        recipe = PRESETS[self.preset]()
+        preset = self.preset or "default"
+        default = PRESETS[preset]()
+        recipe = with_settings(default, self.settings, self.recipe)
+        for name, (value, usual) in differences(recipe, default).items():
+            say(f"{name} is {value} (preset {preset}: {usual})")
         if self.robots is not None:
             recipe = replace(recipe, robots=self.robots)
         if self.threads is not None:
             recipe = replace(recipe, threads=self.threads)
         if self.iterations is not None:
             recipe = recipe.with_iterations(self.iterations)
-        folder = self.out or Path("runs") / f"{machine.name}-{self.seed}"
+        folder = self.out or Path("runs") / f"{machine.name}-{seed}"
         return folder, partial(
             Run.create,
             machine=machine,
             recipe=recipe,
-            seed=self.seed,
+            seed=seed,
             command=shlex.join(["gaitshift", *sys.argv[1:]]),
             robot=robot,
             overwrite=self.overwrite,
@@ -121,7 +131,8 @@ class Train(RobotOption):
         for field in fields(Train):
             if field.name in ("resume", "json") or getattr(self, field.name) == field.default:
                 continue
-            option = "a gait" if field.name == "gait" else f"--{field.name.replace('_', '-')}"
+            names = {"gait": "a gait", "settings": "--set"}
+            option = names.get(field.name, f"--{field.name.replace('_', '-')}")
             raise GaitshiftError(
                 f"{option} must not be given with --resume, which has its own settings"
             )

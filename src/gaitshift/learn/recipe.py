@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, field, replace
 
+from gaitshift.data import known_names
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.env import Curriculum, EnvConfig
-from gaitshift.sim.world import Fidelity
+from gaitshift.sim.world import FIDELITIES, Fidelity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,9 +47,35 @@ class PpoConfig:
     """Whether Adam runs as one kernel: a sixth less time with many small mini-batches, and
     different rounding."""
 
+    def __post_init__(self) -> None:
+        if not all(1 <= width <= 8192 for width in self.hidden):
+            raise GaitshiftError(f"hidden must be widths of 1 to 8192, got {self.hidden}")
+        check_ranges(
+            self,
+            epochs=(1, 1000),
+            mini_batches=(1, 100_000),
+            discount=(0.0, 0.99999),
+            gae_lambda=(0.0, 1.0),
+            clip=(0.001, 10.0),
+            learning_rate=(1e-7, 1.0),
+            desired_kl=(0.0, 10.0),
+            entropy=(0.0, 10.0),
+            initial_std=(0.05, 2.0),
+            output_gain=(1e-6, 100.0),
+            reward_scale=(1e-6, 1e6),
+        )
+
 
 FIELD_KINDS = ("flat", "perlin", "slope", "stair", "step")
 """Kinds of fields that a rough stage may have."""
+
+
+def check_ranges(config: object, **ranges: tuple[float, float]) -> None:
+    """`GaitshiftError` unless each field named is within its least and greatest value."""
+    for name, (low, high) in ranges.items():
+        value = getattr(config, name)
+        if not low <= value <= high:
+            raise GaitshiftError(f"{name} must be {low:.10g} to {high:.10g}, got {value}")
 
 
 def _shared_out(**fields: int) -> tuple[str, ...]:
@@ -107,12 +134,25 @@ class Stage:
     average is better than most of them (Izmailov et al. 2018). 0: the last actor alone."""
 
     def __post_init__(self) -> None:
-        for name in ("settle", "averaged"):
-            if not 0.0 <= getattr(self, name) <= 1.0:
-                raise GaitshiftError(f"{name} must be 0 to 1, got {getattr(self, name)}")
-        for name in ("kl_factor", "horizon_factor", "trace_factor"):
-            if not getattr(self, name) > 0.0:
-                raise GaitshiftError(f"{name} must be above 0, got {getattr(self, name)}")
+        if self.fidelity not in FIDELITIES:
+            raise GaitshiftError(known_names("fidelity", self.fidelity, FIDELITIES))
+        check_ranges(
+            self,
+            iterations=(0, 1_000_000),
+            amplitude=(0.0, 1.0),
+            slope=(0.0, 60.0),
+            stair=(0.0, 1.0),
+            step=(0.0, 1.0),
+            redraw_every=(1, 1_000_000),
+            push=(0.0, 1000.0),
+            mixed_starts=(0.0, 1.0),
+            swing_factor=(0.01, 100.0),
+            kl_factor=(0.001, 1000.0),
+            horizon_factor=(0.001, 1000.0),
+            trace_factor=(0.001, 1000.0),
+            settle=(0.0, 1.0),
+            averaged=(0.0, 1.0),
+        )
         unknown = [kind for kind in self.fields if kind not in FIELD_KINDS]
         if unknown or not self.fields:
             raise GaitshiftError(
@@ -191,25 +231,23 @@ class Recipe:
     """Threads of the physics; 0: one a core."""
 
     def __post_init__(self) -> None:
-        for name, low, high in (
-            ("robots", 1, 65536),
-            ("steps", 1, 100_000),
-            ("checkpoint_every", 1, 1_000_000),
-            ("threads", 1, 1024),
-            ("physics_threads", 0, 1024),
-            ("penalty_start", 0.0, 1.0),
-            ("penalty_until", 1, 1_000_000),
-        ):
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise GaitshiftError(f"{name} must be {low} to {high}, got {value}")
+        check_ranges(
+            self,
+            robots=(1, 65536),
+            steps=(1, 100_000),
+            checkpoint_every=(1, 1_000_000),
+            threads=(1, 1024),
+            physics_threads=(0, 1024),
+            strict_share=(0.0, 1.0),
+            penalty_start=(0.0, 1.0),
+            penalty_until=(1, 1_000_000),
+        )
         for name in ("strict", "command"):
             if not 0 <= getattr(self, f"{name}_from") < getattr(self, f"{name}_until"):
                 raise GaitshiftError(f"{name}_from must be 0 or more and below {name}_until")
-        if any(stage.iterations < 0 for stage in self.stages) or self.iterations < 1:
+        if self.iterations < 1:
             raise GaitshiftError(
-                "iterations of the stages must be 0 or more and 1 or more together, got "
-                f"{[stage.iterations for stage in self.stages]}"
+                f"iterations of the stages must be 1 or more together, got {self.iterations}"
             )
 
     @property

@@ -102,6 +102,12 @@ class Run:
         overwrite: bool = False,
     ) -> "Run":
         """A new run in a new folder, or in the folder of a run that has no checkpoint yet."""
+        samples = recipe.robots * recipe.steps
+        if recipe.ppo.mini_batches > samples:
+            raise GaitshiftError(
+                f"mini_batches must be 1 to robots × steps, {samples}, got "
+                f"{recipe.ppo.mini_batches}"
+            )
         if folder.exists() and not (folder.is_dir() and _is_barely_begun(folder)):
             if not overwrite:
                 raise GaitshiftError(

@@ -26,6 +26,7 @@ FRICTION = 0.8
 
 
 Fidelity = Literal["exact", "coarse"]
+FIDELITIES: tuple[Fidelity, ...] = ("exact", "coarse")
 """How finely contacts are simulated: by the step, the friction cones and the slip correction of the
 robot's model, or coarsely, in less than half the time. Standing feet then creep by millimetres a
 second, so nothing is judged by it."""
