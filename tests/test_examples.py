@@ -11,7 +11,12 @@ from waiting import PATIENCE
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("*.py"))
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def _marked(path):
+    """Trainings are slow: they import torch."""
+    return pytest.param(path, marks=[pytest.mark.slow] * path.stem.startswith("train_"))
+
+
+@pytest.mark.parametrize("path", map(_marked, EXAMPLES), ids=lambda path: path.stem)
 def test_an_example_runs(path, tmp_path):
     iterations = ["2"] if path.stem.startswith("train_") else []
     done = subprocess.run(

@@ -218,6 +218,7 @@ def test_loads_of_standing_legs_are_the_weight():
     np.testing.assert_allclose(torques, expected[6:], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_demonstration_walks_on_oscillators(tmp_path, capsys):
     """There and back by their own graph, each shift behind the border that is its cause."""
     track = ["--track", "flat@3,perlin:0.05@5,flat@3", "--controller", "cpg"]

@@ -174,6 +174,7 @@ def test_the_interval_of_an_area_is_wide_where_trials_are_few():
 # The commands -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_identify_writes_a_report_of_anybodys_log(tmp_path, capsys):
     logs = [str(table(tmp_path / f"walk{seed}.csv", walk(seed))) for seed in range(2)]
     out = tmp_path / "report"
@@ -358,6 +359,7 @@ def test_numbers_that_were_kept_are_not_used_for_others(tmp_path, monkeypatch, t
     assert after == ["walk-0", "walk-1"]
 
 
+@pytest.mark.slow
 def test_the_classifier_goes_on_too(tmp_path, monkeypatch, two_logs):
     out, whole = tmp_path / "out", tmp_path / "whole"
     for folder, killed_at in ((whole, None), (out, 5), (out, None)):
@@ -456,6 +458,7 @@ def assert_same(one, other):
         assert one == other
 
 
+@pytest.mark.slow
 def test_record_and_identify_find_noise_on_the_standard_courses(tmp_path, capsys):
     logs = tmp_path / "logs"
     command = ["record", "trot", "--out", str(logs), "--courses", "flat", "into-0.20"]
@@ -508,6 +511,7 @@ def test_a_classifier_is_judged_on_robots_that_it_never_saw():
     assert areas[1] < 0.7
 
 
+@pytest.mark.slow
 def test_a_classifier_learns_what_rough_ground_is():
     classifier = RoughnessClassifier.fit(ways())
     other = march("into", noise=0.04, seed=9)
@@ -523,6 +527,7 @@ def test_a_classifier_needs_both_labels(rough, says):
         RoughnessClassifier.fit([replace(one_kind, rough=np.full_like(one_kind.rough, rough))])
 
 
+@pytest.mark.slow
 def test_of_all_conditions_the_classifier_is_left_out_where_one_robot_is_all_there_is(
     tmp_path, capsys
 ):

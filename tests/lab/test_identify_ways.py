@@ -151,6 +151,7 @@ def test_the_numbers_of_a_crossing_are_those_of_the_same_robots_from_the_noise_o
     np.testing.assert_allclose(first[0].tally.metres, second[0].tally.metres)
 
 
+@pytest.mark.slow
 def test_identify_finds_the_way_back_in_a_table_of_smooth_rough_and_smooth_ground(tmp_path, capsys):
     logs = [
         str(table(tmp_path / f"walk{seed}.csv", crossing(robots=1, seed=seed))) for seed in range(3)

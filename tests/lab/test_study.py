@@ -104,6 +104,7 @@ def test_more_shifts_than_there_and_back_are_chatter(log):
     assert (row["chattered"], row["shifts"], row["runs"]) == (2, 2.5, 4)
 
 
+@pytest.mark.slow
 def test_only_the_oracle_shifts_where_the_noise_is_seen():
     """On level ground nobody does; over noise the oracle goes there and back once."""
     alone, _, height, oracle = strategies("trot", "bound", ("height_difference",))
@@ -112,6 +113,7 @@ def test_only_the_oracle_shifts_where_the_noise_is_seen():
     assert cross(BOTH, oracle, amplitude=0.1, runs=4, seed=1).shifts.tolist() == [2] * 4
 
 
+@pytest.mark.slow
 def test_the_command_goes_on_where_it_was_broken_off(tmp_path, capsys):
     out = tmp_path / "study"
     command = ["study", "--runs", "4", "--amplitudes", "0.05", "--conditions", "height_difference"]

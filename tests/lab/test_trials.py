@@ -169,6 +169,7 @@ def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys
     assert "speed_error [m/s]" in table
 
 
+@pytest.mark.slow
 def test_commands_are_asked_for_over_their_ranges_and_what_comes_of_them_is_told(
     tmp_path, capsys, monkeypatch
 ):

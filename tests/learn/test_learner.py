@@ -61,6 +61,7 @@ class EveryStepIsWorthOne(GaitEnv):
         return observation, np.ones_like(reward), terminated, truncated, info
 
 
+@pytest.mark.slow
 def test_a_reward_of_one_for_ever_is_worth_its_geometric_sum_though_episodes_are_cut_short():
     # 1 + γ + γ² + … = 1 / (1 - γ) = 10; five steps alone would be worth at most 4.1.
     # Only the action is shown: the critic must not tell by the observation that an episode is over.

@@ -23,6 +23,7 @@ TRACK = "flat@3,perlin:0.12@5,flat@2"
 # Whether a page keeps real time -----------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_page_walks_no_faster_than_time_and_draws_every_second_step(capsys):
     main(["bench", "page", "--page-seconds", "2", "--json"])
     found = json.loads(capsys.readouterr().out)

@@ -85,6 +85,7 @@ def test_meshes_are_looks_alone():
 
 
 @needs_meshes
+@pytest.mark.slow
 def test_they_are_converted_once(cache: Path, monkeypatch: pytest.MonkeyPatch):
     first = _dressed()
     (kept,) = cache.iterdir()

@@ -13,7 +13,7 @@ import tyro
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from gaitshift.cli.output import emit_json
+from gaitshift.cli.output import emit_json, say
 from gaitshift.cli.robot_options import RobotOption
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError

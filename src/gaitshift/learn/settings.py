@@ -50,9 +50,10 @@ def differences(recipe: Recipe, default: Recipe) -> dict[str, tuple[Any, Any]]:
 def _plant(tree: dict[str, Any], names: Sequence[str], value: Any) -> None:
     """Puts a value into nested tables; `GaitshiftError` where it is given twice."""
     for depth, name in enumerate(names[:-1], start=1):
-        tree = tree.setdefault(name, {})
-        if not isinstance(tree, dict):
+        below: Any = tree.setdefault(name, {})
+        if not isinstance(below, dict):
             raise GaitshiftError(f"{'.'.join(names[:depth])} and {'.'.join(names)} contradict")
+        tree = cast("dict[str, Any]", below)
     if names[-1] in tree:
         raise GaitshiftError(f"{'.'.join(names)} must be given once")
     tree[names[-1]] = value
@@ -97,7 +98,7 @@ def _changed(part: Any, value: Any, where: str) -> Any:
     if _is_stages(part):
         return tuple((inner | new).values())
     try:
-        return replace(part, **new)
+        return replace(cast(Any, part), **new)
     except GaitshiftError as error:
         raise GaitshiftError(f"{where}: {error}" if where else str(error)) from None
 
