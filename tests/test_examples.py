@@ -16,7 +16,7 @@ def _marked(path):
     return pytest.param(path, marks=[pytest.mark.slow] * path.stem.startswith("train_"))
 
 
-@pytest.mark.parametrize("path", map(_marked, EXAMPLES), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [_marked(path) for path in EXAMPLES], ids=lambda path: path.stem)
 def test_an_example_runs(path, tmp_path):
     iterations = ["2"] if path.stem.startswith("train_") else []
     done = subprocess.run(

@@ -119,6 +119,14 @@ def located(where: str) -> Generator[None]:
         raise GaitshiftError(f"{where}: {error}") from None
 
 
+def check_ranges(config: object, **ranges: tuple[float, float]) -> None:
+    """`GaitshiftError` unless each field named is within its least and greatest value."""
+    for name, (low, high) in ranges.items():
+        value = getattr(config, name)
+        if not low <= value <= high:
+            raise GaitshiftError(f"{name} must be {low:.10g} to {high:.10g}, got {value}")
+
+
 def known_names(kind: str, name: str, known: tuple[str, ...]) -> str:
     """One line that names the unknown name, a similar known name, and all known names."""
     close = get_close_matches(name, known, n=1)

@@ -82,9 +82,12 @@ def opens_text(call: ast.Call, name: str) -> bool:
     if name == "open":
         owner = ast.unparse(getattr(call.func, "value", ast.Constant("")))
         modes = [ast.unparse(part) for part in call.args]
-        opener = owner in ("os", "Image", "tarfile", "ResumableTable")  # of something else
+        # Of something else, or of bytes.
+        opener = owner in ("os", "Image", "tarfile", "ResumableTable", "archive")
         return not opener and not any(mode in ("'rb'", "'wb'") for mode in modes)
     named = {keyword.arg for keyword in call.keywords}
+    if isinstance(call.func, ast.Name) and name == "write_text":  # ours, of whole files in UTF-8
+        return False
     return name in ("read_text", "write_text", "fdopen") or (name == "run" and "text" in named)
 
 
@@ -94,7 +97,7 @@ def test_every_text_file_is_opened_with_an_encoding():
     found = [
         (path, call) for path in files for call, name in calls_of(path) if opens_text(call, name)
     ]
-    assert len(found) > 30
+    assert len(found) > 20
     lacking = [
         f"{path.relative_to(ROOT)}:{call.lineno}"
         for path, call in found
@@ -144,6 +147,7 @@ main(["report", sys.argv[1]])
 """
 
 
+@pytest.mark.slow
 def test_a_user_without_a_home_and_a_name_gets_a_page(tmp_path):
     log = tmp_path / "log.npz"
     code, err = python(HOMELESS, str(log), MPLCONFIGDIR=str(tmp_path))

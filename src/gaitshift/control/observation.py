@@ -141,6 +141,16 @@ DEFAULT_SLICES = (
 )
 
 
+def check_slices(names: tuple[str, ...]) -> None:
+    """`GaitshiftError` unless all names are of slices."""
+    known = (*_MACHINE_SLICES, *_SLICES)
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        raise GaitshiftError(
+            f"observation slices must be among {', '.join(known)}, got '{unknown[0]}'"
+        )
+
+
 @dataclass(frozen=True)
 class Observation:
     """Which slices are observed, in which order, for one machine."""
@@ -151,12 +161,7 @@ class Observation:
     names: tuple[str, ...] = DEFAULT_SLICES
 
     def __post_init__(self) -> None:
-        known = (*_MACHINE_SLICES, *_SLICES)
-        unknown = [name for name in self.names if name not in known]
-        if unknown:
-            raise GaitshiftError(
-                f"observation slices must be among {', '.join(known)}, got '{unknown[0]}'"
-            )
+        check_slices(self.names)
 
     @cached_property
     def _parts(self) -> tuple[_Slice, ...]:

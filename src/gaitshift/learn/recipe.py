@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from gaitshift.data import known_names
+from gaitshift.data import check_ranges, known_names
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.env import Curriculum, EnvConfig
 from gaitshift.sim.world import FIDELITIES, Fidelity
@@ -68,14 +68,6 @@ class PpoConfig:
 
 FIELD_KINDS = ("flat", "perlin", "slope", "stair", "step")
 """Kinds of fields that a rough stage may have."""
-
-
-def check_ranges(config: object, **ranges: tuple[float, float]) -> None:
-    """`GaitshiftError` unless each field named is within its least and greatest value."""
-    for name, (low, high) in ranges.items():
-        value = getattr(config, name)
-        if not low <= value <= high:
-            raise GaitshiftError(f"{name} must be {low:.10g} to {high:.10g}, got {value}")
 
 
 def _shared_out(**fields: int) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_args, get_type_hints
 
 from gaitshift.data import known_names, located, tables_in
 from gaitshift.errors import GaitshiftError
@@ -95,12 +95,17 @@ def _changed(part: Any, value: Any, where: str) -> Any:
             place = f"{where}: " if where else ""
             raise GaitshiftError(f"{place}{known_names(kind, name, tuple(inner))}")
         new[name] = _changed(inner[name], below, f"{dot}{name}")
+        choices = () if _is_stages(part) else get_args(get_type_hints(cast(Any, type(part)))[name])
+        if isinstance(inner[name], str) and choices and new[name] not in choices:
+            raise GaitshiftError(
+                f"{dot}{name} must be one of {', '.join(choices)}, got {new[name]!r}"
+            )
     if _is_stages(part):
         return tuple((inner | new).values())
     try:
         return replace(cast(Any, part), **new)
     except GaitshiftError as error:
-        raise GaitshiftError(f"{where}: {error}" if where else str(error)) from None
+        raise GaitshiftError(f"{dot}{error}") from None  # which begins with the setting's name
 
 
 def _checked(old: Any, value: Any, where: str) -> Any:

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from gaitshift.control.observation import DEFAULT_SLICES, PAPER_SLICES
+from gaitshift.control.observation import DEFAULT_SLICES, PAPER_SLICES, check_slices
+from gaitshift.data import check_ranges
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
 from gaitshift.sim.reward import RewardConfig
@@ -43,16 +44,21 @@ class EnvConfig:
     """A robot nearer than this to the border of its terrain restarts elsewhere [m]; ours."""
 
     def __post_init__(self) -> None:
-        if self.episode_steps < 1:
-            raise GaitshiftError(f"episode_steps must be 1 or more, got {self.episode_steps}")
+        check_slices(self.observed)
+        check_ranges(
+            self,
+            episode_steps=(1, 1_000_000),
+            command_share=(0.0, 1.0),
+            heading_range=(0.0, 3.2),
+            command_interval=(1, 1_000_000),
+            joint_noise=(0.0, 1.0),
+            velocity_noise=(0.0, 10.0),
+            terrain_margin=(0.0, 100.0),
+        )
         if self.forward_speed is not None and not 0 <= self.forward_speed <= MOST_SPEED:
             raise GaitshiftError(
                 f"forward_speed must be 0 to {MOST_SPEED:g} m/s, got {self.forward_speed}"
             )
-        if not 0 <= self.command_share <= 1:
-            raise GaitshiftError(f"command_share must be 0 to 1, got {self.command_share}")
-        if self.command_interval < 1:
-            raise GaitshiftError(f"command_interval must be 1 or more, got {self.command_interval}")
 
     @classmethod
     def paper(cls) -> "EnvConfig":
