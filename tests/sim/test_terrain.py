@@ -6,6 +6,7 @@ import pytest
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.terrain import (
+    Fields,
     Terrain,
     flat,
     from_spec,
@@ -150,6 +151,20 @@ def test_a_point_that_is_not_a_number_has_no_height_and_disturbs_no_other():
     assert np.isnan(terrain.height_at(xy)).tolist() == [False, True, False]
     np.testing.assert_array_equal(terrain.height_at(xy)[[0, 2]], heights[[0, 2]])
     assert not terrain.contains(xy)[1]
+
+
+UNLIKE = (random_field(), random_field(rows=2, cols=9, seed=1), flat(3.0, 2.0).moved(0.3, -0.2))
+
+
+@pytest.mark.parametrize("fields", [UNLIKE, UNLIKE[2:], UNLIKE[:1]], ids=["three", "flat", "one"])
+def test_each_robot_stands_on_its_own_field(fields):
+    xy = np.random.default_rng(0).uniform(-4.0, 4.0, (7, 4, 2))
+    xy[1, 2, 0], xy[2, 0, 1], xy[3, 3] = np.nan, np.inf, -np.inf
+    there = Fields(fields, 7)
+    alone = np.array([fields[i % len(fields)].height_at(points) for i, points in enumerate(xy)])
+    np.testing.assert_array_equal(there.height_at(xy), alone)
+    some = np.array([6, 1, 2])
+    np.testing.assert_array_equal(there.height_at(xy[some], some), alone[some])
 
 
 @pytest.mark.parametrize("batch", [(), (4,), (128, 4), (0,)])

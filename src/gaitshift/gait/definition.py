@@ -138,7 +138,7 @@ class Definition:
         """The dwell in `dwell_range` whose cycle is nearest to `stride` [control steps]."""
         low, high = self.dwell_range
         strides = self._stride_of_dwell[low : high + 1]
-        return low + np.abs(np.asarray(stride)[:, None] - strides).argmin(axis=1)
+        return low + np.searchsorted((strides[1:] + strides[:-1]) / 2, stride)
 
     def mirrored(self: _Own) -> _Own:
         """Return the machine of the robot seen in a mirror; feet in names of states change too."""

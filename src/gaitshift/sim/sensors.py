@@ -21,7 +21,7 @@ def sense(
     contact: Bool[np.ndarray, "N 4"],
     mass: float,
 ) -> Proprioception:
-    """Proprioception without noise and without delay.
+    """Proprioception without noise and without delay, of arrays that do not change later.
 
     Args:
         truth: the privileged state at the same instant.
@@ -33,14 +33,16 @@ def sense(
         mass: of the robot [kg].
     """
     offset = truth.foot_position_w - truth.base_position_w[:, None]
-    return Proprioception(
+    sensed = Proprioception(
         contact=contact,
         foot_position_b=np.einsum("nij,nli->nlj", rotation, offset),
         orientation=truth.base_quaternion_w,
-        joint_position=qpos[:, POSE:].copy(),
-        joint_velocity=qvel[:, TWIST:].copy(),
-        joint_torque=torque.copy(),
+        joint_position=qpos[:, POSE:],
+        joint_velocity=qvel[:, TWIST:],
+        joint_torque=torque,
         velocity_b=truth.velocity_b,
-        angular_velocity_b=qvel[:, 3:TWIST].copy(),
+        angular_velocity_b=qvel[:, 3:TWIST],
         mass=mass,
     )
+    vars(sensed)["rotation"] = rotation  # which it would compute again
+    return sensed

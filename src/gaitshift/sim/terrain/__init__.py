@@ -1,6 +1,6 @@
 """The ground in metres: height fields, makers of terrains and tracks, and their specs as text."""
 
-from gaitshift.sim.terrain.height_field import Section, Terrain, UnitField, to_unit_interval
+from gaitshift.sim.terrain.height_field import Fields, Section, Terrain, UnitField, to_unit_interval
 from gaitshift.sim.terrain.kind import Kind
 from gaitshift.sim.terrain.pebbles import pebbles
 from gaitshift.sim.terrain.perlin import perlin
@@ -9,6 +9,7 @@ from gaitshift.sim.terrain.spec import KINDS, from_spec, sections_of, spec_help,
 
 __all__ = [
     "KINDS",
+    "Fields",
     "Kind",
     "Section",
     "Terrain",

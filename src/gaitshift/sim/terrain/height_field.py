@@ -1,9 +1,12 @@
 """The ground: heights on a regular grid, and the surface that MuJoCo spans over them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 
 from gaitshift.errors import GaitshiftError
 
@@ -79,7 +82,7 @@ class Terrain:
         (x0, y0), (length, width) = self.origin, self.size
         return x0, x0 + length, y0, y0 + width
 
-    @property
+    @cached_property
     def is_flat(self) -> bool:
         """Whether all heights are the same."""
         return bool(self.height.min() == self.height.max())
@@ -90,10 +93,7 @@ class Terrain:
         Outside the field, where MuJoCo has no ground, it is the height of the nearest point of the
         border. The height of a NaN point is NaN.
         """
-        near, middle, far, u, v = self._triangle(xy)
-        # From the corner along the grid as far as the larger of u, v, then along the other axis.
-        height = near + np.maximum(u, v) * (middle - near) + np.minimum(u, v) * (far - middle)
-        return np.asarray(height)
+        return _height_at(xy, self.grid)
 
     def contains(
         self, xy: Float[np.ndarray, "*batch 2"], margin: float = 0.0
@@ -112,25 +112,70 @@ class Terrain:
             sections=tuple(replace(s, x0=s.x0 + dx, x1=s.x1 + dx) for s in self.sections),
         )
 
-    def _triangle(
-        self, xy: Float[np.ndarray, "*batch 2"]
-    ) -> tuple[Float[np.ndarray, "*batch"], ...]:
-        """Triangle below each point: heights of its three corners, and u, v in [0, 1] in the cell.
+    @property
+    def grid(self) -> "Grid":
+        """Where its heights are looked up."""
+        (rows, cols), (dx, dy) = self.height.shape, self.cell
+        return Grid(self.height.reshape(-1), 0, rows, cols, *self.origin, dx, dy)
 
-        The corners are [i, j], then [i, j+1] where u ≥ v or [i+1, j] where not, then [i+1, j+1].
-        """
-        samples, (rows, cols) = self.height.reshape(-1), self.height.shape
-        dx, dy = self.cell
-        u = np.minimum(np.maximum((xy[..., 0] - self.origin[0]) / dx, 0.0), cols - 1)
-        v = np.minimum(np.maximum((xy[..., 1] - self.origin[1]) / dy, 0.0), rows - 1)
-        # fmin, unlike minimum, gives points that are NaN some cell; their u, v stay NaN.
-        j = np.asarray(np.fmin(u, cols - 2)).astype(np.intp)
-        i = np.asarray(np.fmin(v, rows - 2)).astype(np.intp)
-        u, v = np.asarray(u - j), np.asarray(v - i)
-        corner = i * cols + j
-        middle = corner + np.where(u < v, cols, 1)
-        near, far = samples.take(corner), samples.take(corner + cols + 1)
-        return np.asarray(near), np.asarray(samples.take(middle)), np.asarray(far), u, v
+
+class Grid(NamedTuple):
+    """Where heights are looked up: a field, or for each robot its own (arrays of N × 1)."""
+
+    samples: Float[np.ndarray, " S"]
+    """Heights of all fields, row by row [m]."""
+    first: Int[np.ndarray, "N 1"] | int
+    """Number of a field's first sample."""
+    rows: Int[np.ndarray, "N 1"] | int
+    cols: Int[np.ndarray, "N 1"] | int
+    x: Float[np.ndarray, "N 1"] | float
+    y: Float[np.ndarray, "N 1"] | float
+    """Place of the first sample [m]."""
+    dx: Float[np.ndarray, "N 1"] | float
+    dy: Float[np.ndarray, "N 1"] | float
+    """Distance between neighbouring samples [m]."""
+
+
+class Fields:
+    """The ground under N robots: robot i stands on field i mod K of K fields."""
+
+    def __init__(self, fields: Sequence[Terrain], n: int) -> None:
+        grids = [field.grid for field in fields]
+        which = np.arange(n) % len(fields)
+        self._samples = np.concatenate([grid.samples for grid in grids])
+        first = np.cumsum([0, *(grid.samples.size for grid in grids[:-1])])
+        sizes = np.array([(grid.rows, grid.cols) for grid in grids])
+        self._whole = np.column_stack((first, sizes))[which]
+        self._places = np.array([(grid.x, grid.y, grid.dx, grid.dy) for grid in grids])[which]
+        self._is_flat = all(field.is_flat for field in fields)
+
+    def height_at(
+        self, xy: Float[np.ndarray, "K M 2"], ids: Int[np.ndarray, " K"] | slice = slice(None)
+    ) -> Float[np.ndarray, "K M"]:
+        """Height below M points of each of these robots [m], as `Terrain.height_at` gives it."""
+        first, rows, cols = self._whole[ids].T[..., None]
+        if self._is_flat:
+            return np.where(np.isnan(xy).any(axis=-1), np.nan, self._samples[first])
+        x, y, dx, dy = self._places[ids].T[..., None]
+        return _height_at(xy, Grid(self._samples, first, rows, cols, x, y, dx, dy))
+
+
+def _height_at(xy: Float[np.ndarray, "*batch 2"], grid: Grid) -> Float[np.ndarray, "*batch"]:
+    samples, first, rows, cols, x, y, dx, dy = grid
+    u = np.minimum(np.maximum((xy[..., 0] - x) / dx, 0.0), cols - 1)
+    v = np.minimum(np.maximum((xy[..., 1] - y) / dy, 0.0), rows - 1)
+    # fmin, unlike minimum, gives points that are NaN some cell; their u, v stay NaN.
+    j = np.asarray(np.fmin(u, cols - 2)).astype(np.intp)
+    i = np.asarray(np.fmin(v, rows - 2)).astype(np.intp)
+    u, v = u - j, v - i  # place in the cell, in [0, 1]
+    # The triangle has corner [i, j], then [i, j+1] where u ≥ v or [i+1, j], then [i+1, j+1].
+    corner = first + i * cols + j
+    near = samples.take(corner)
+    middle = samples.take(corner + np.where(u < v, cols, 1))
+    far = samples.take(corner + cols + 1)
+    # From the corner along the grid as far as the larger of u, v, then along the other axis.
+    height = near + np.maximum(u, v) * (middle - near) + np.minimum(u, v) * (far - middle)
+    return np.asarray(height)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,7 +15,7 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Gains, Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.sensors import POSE, TWIST, sense
-from gaitshift.sim.terrain import Terrain, to_unit_interval
+from gaitshift.sim.terrain import Fields, Terrain, to_unit_interval
 from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
 
 GROUND = "ground"
@@ -152,6 +152,7 @@ class World:
             raise GaitshiftError("there must be at least one terrain, got none")
         state = self._kept_state(terrains) if hasattr(self, "_batch") else None
         self.terrains = terrains[: self.n]
+        self._fields = Fields(self.terrains, self.n)
         models = [
             build_model(self.robot, self._gains, ground, fidelity) for ground in self.terrains
         ]
@@ -234,7 +235,7 @@ class World:
                 self._qvel[ids, part] = given
         self._batch.forward(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_POS))
         feet = self._feet(self._sensors[ids])
-        below = (feet[..., 2] - self._ground(feet[..., :2], ids)).min(axis=1)
+        below = (feet[..., 2] - self._fields.height_at(feet[..., :2], ids)).min(axis=1)
         self._qpos[ids, 2] -= below
         self._settle(ids)
 
@@ -296,18 +297,17 @@ class World:
 
     def _measure(self) -> None:
         """Updates `truth` and `sensed`."""
-        qpos, qvel, sensors = self._qpos, self._qvel, self._sensors
-        feet, force = self._feet(sensors), sensors[:, 24:28].copy()
-        quaternion = qpos[:, 3:POSE].copy()
-        rotation = rotation_of(quaternion)
+        qpos, qvel, sensors = self._qpos.copy(), self._qvel.copy(), self._sensors.copy()
+        feet, force = self._feet(sensors), sensors[:, 24:28]
+        rotation = rotation_of(qpos[:, 3:POSE])
         self.truth = Privileged(
-            base_position_w=qpos[:, :3].copy(),
-            base_quaternion_w=quaternion,
+            base_position_w=qpos[:, :3],
+            base_quaternion_w=qpos[:, 3:POSE],
             velocity_b=np.einsum("nij,ni->nj", rotation, qvel[:, :3]),
             foot_position_w=feet,
-            foot_velocity_w=sensors[:, 12:24].reshape(-1, 4, 3).copy(),
+            foot_velocity_w=sensors[:, 12:24].reshape(-1, 4, 3),
             foot_force=force,
-            clearance=feet[..., 2] - self._ground(feet[..., :2], None),
+            clearance=feet[..., 2] - self._fields.height_at(feet[..., :2]),
             body_contact=sensors[:, 28] > 0.0,
             diverged=np.zeros(self.n, dtype=bool),
         )
@@ -316,7 +316,7 @@ class World:
             rotation,
             qpos,
             qvel,
-            self._torque,
+            self._torque.copy(),
             contact=force > CONTACT_FORCE,
             mass=self.robot.mass,
         )
@@ -326,18 +326,6 @@ class World:
         feet = sensors[:, :12].reshape(-1, 4, 3).copy()
         feet[..., 2] -= self.robot.foot_radius
         return feet
-
-    def _ground(
-        self, xy: Float[np.ndarray, "K 4 2"], ids: Int[np.ndarray, " K"] | None
-    ) -> Float[np.ndarray, "K 4"]:
-        """Height of the ground under world points of these robots (None: of all) [m]."""
-        if len(self.terrains) == 1:
-            return self.terrains[0].height_at(xy)
-        which = (np.arange(self.n) if ids is None else ids) % len(self.terrains)
-        height = np.empty(xy.shape[:-1])
-        for index, terrain in enumerate(self.terrains):
-            height[which == index] = terrain.height_at(xy[which == index])
-        return height
 
     def _settle(self, ids: Int[np.ndarray, " K"]) -> None:
         """Updates every measured quantity of these robots."""
@@ -353,9 +341,8 @@ class World:
         """The present state, moved vertically so that no foot penetrates deeper than before."""
         qpos, qvel = self.state()
         feet = self.truth.foot_position_w[..., :2]
-        before = self._ground(feet, None)
-        self.terrains = terrains[: self.n]
-        qpos[:, 2] += (self._ground(feet, None) - before).max(axis=1)
+        before, after = self._fields, Fields(terrains[: self.n], self.n)
+        qpos[:, 2] += (after.height_at(feet) - before.height_at(feet)).max(axis=1)
         return qpos, qvel
 
 
