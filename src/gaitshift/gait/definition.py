@@ -115,7 +115,7 @@ class Definition:
         """u0."""
         return 0
 
-    @property
+    @cached_property
     def accepting(self) -> tuple[int, ...]:
         """F: the states in which a run ends; empty for a gait without an end."""
         return tuple(u for u, state in enumerate(self.states) if state.accepting)
@@ -136,9 +136,7 @@ class Definition:
 
     def dwell_for(self, stride: Float[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
         """The dwell in `dwell_range` whose cycle is nearest to `stride` [control steps]."""
-        low, high = self.dwell_range
-        strides = self._stride_of_dwell[low : high + 1]
-        return low + np.searchsorted((strides[1:] + strides[:-1]) / 2, stride)
+        return self.dwell_range[0] + np.searchsorted(self._between_strides, stride)
 
     def mirrored(self: _Own) -> _Own:
         """Return the machine of the robot seen in a mirror; feet in names of states change too."""
@@ -214,5 +212,8 @@ class Definition:
         return shares(self.states, self.edges, self.dwell)
 
     @cached_property
-    def _stride_of_dwell(self) -> Int[np.ndarray, " D"]:
-        return np.array([stride(self._shares, dwell) for dwell in range(self.dwell_range[1] + 1)])
+    def _between_strides(self) -> Float[np.ndarray, " D"]:
+        """The middles between the strides of neighbouring dwells of the range."""
+        low, high = self.dwell_range
+        strides = np.array([self.stride(dwell) for dwell in range(low, high + 1)])
+        return (strides[1:] + strides[:-1]) / 2

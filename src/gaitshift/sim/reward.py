@@ -144,6 +144,8 @@ def walk_reward(
         "chatter": config.chatter * chatter,
         "action_rate": config.action_rate * _squares(action_change),
     }
+    if penalty_scale == 1.0:
+        return terms
     return {
         name: penalty_scale * term if getattr(config, name) < 0 else term
         for name, term in terms.items()

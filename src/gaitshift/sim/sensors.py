@@ -35,7 +35,7 @@ def sense(
     offset = truth.foot_position_w - truth.base_position_w[:, None]
     sensed = Proprioception(
         contact=contact,
-        foot_position_b=np.einsum("nij,nli->nlj", rotation, offset),
+        foot_position_b=offset @ rotation,  # rotated back, row by row
         orientation=truth.base_quaternion_w,
         joint_position=qpos[:, POSE:],
         joint_velocity=qvel[:, TWIST:],

@@ -129,9 +129,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             "forward_speed": truth.forward_speed,
             "diverged": truth.diverged,
         }
-        terminated = (
-            truth.body_contact | truth.diverged | np.isin(step.state, self.machine.accepting)
-        )
+        terminated = truth.body_contact | truth.diverged
+        if self.machine.accepting:
+            terminated |= np.isin(step.state, self.machine.accepting)
         truncated = (self._age >= self.config.episode_steps) | self._left_terrain(truth)
         truncated &= ~terminated
         observation = self._next_observation(terminated | truncated, info)
