@@ -1,9 +1,11 @@
 """Videos show what is in the log; where nothing can be drawn they say so."""
 
 import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import imageio_ffmpeg
 import mujoco
@@ -347,3 +349,25 @@ def test_a_backend_that_does_not_exist_is_named_with_those_that_do(monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL draws without a screen on Linux alone")
 def test_without_a_display_nothing_has_to_be_set(gl):
     assert in_a_fresh_interpreter() == "drawn (64, 64, 3)"
+
+
+def test_a_film_whose_ffmpeg_ends_early_is_refused_and_the_one_before_it_stays(tmp_path):
+    path, picture = tmp_path / "film.mp4", np.zeros((90, 160, 3), np.uint8)
+    path.write_bytes(b"before")
+
+    def film_cut_short():
+        with FilmWriter(path, 160, 90, 10) as film:
+            for _ in range(5):
+                film.add(picture)
+            for child in children():
+                os.kill(child, signal.SIGKILL)
+
+    with pytest.raises(GaitshiftError, match=r"film.mp4 cannot be written: ffmpeg kept \d of 5"):
+        film_cut_short()
+    assert path.read_bytes() == b"before"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def children():
+    """The processes that this one started."""
+    return map(int, Path("/proc/thread-self/children").read_text().split())

@@ -43,7 +43,8 @@ class FilmWriter:
 
     def __init__(self, path: Path, width: int, height: int, fps: int) -> None:
         self._path, self._file = path, ExitStack()
-        part = self._file.enter_context(replacing(path))
+        self._pictures = 0
+        self._part = part = self._file.enter_context(replacing(path))
         try:
             self._frames = imageio_ffmpeg.write_frames(
                 str(part),
@@ -72,6 +73,7 @@ class FilmWriter:
         except OSError as error:
             reason = str(error).splitlines()[0]
             raise GaitshiftError(f"{self._path} cannot be written: {reason}") from error
+        self._pictures += 1
 
     def __enter__(self) -> "FilmWriter":
         return self
@@ -83,7 +85,23 @@ class FilmWriter:
         trace: TracebackType | None,
     ) -> None:
         self._frames.close()
-        self._file.__exit__(kind, error, trace)
+        if error is not None:
+            self._file.__exit__(kind, error, trace)
+            return
+        with self._file:
+            self._check_whole()
+
+    def _check_whole(self) -> None:
+        """`GaitshiftError` where the file lacks pictures: ffmpeg's end says nothing of it."""
+        try:
+            pictures, _ = imageio_ffmpeg.count_frames_and_secs(str(self._part))
+        except RuntimeError:
+            pictures = 0
+        if pictures != self._pictures:
+            raise GaitshiftError(
+                f"{self._path} cannot be written: ffmpeg kept {pictures} of {self._pictures} "
+                "pictures; is the disk full?"
+            )
 
 
 _GLOW = 1.3
