@@ -351,6 +351,7 @@ def test_without_a_display_nothing_has_to_be_set(gl):
     assert in_a_fresh_interpreter() == "drawn (64, 64, 3)"
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # of its pipe
 def test_a_film_whose_ffmpeg_ends_early_is_refused_and_the_one_before_it_stays(tmp_path):
     path, picture = tmp_path / "film.mp4", np.zeros((90, 160, 3), np.uint8)
     path.write_bytes(b"before")
