@@ -15,8 +15,15 @@ SCREENS = Path(__file__).parent.parent / "out" / "screens"
 
 needed = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
 
-_IS_OPAQUE = """() => [...document.querySelectorAll("canvas")].every(
-    (canvas) => getComputedStyle(canvas).opacity === "1")"""
+_OPAQUE = """
+    document.addEventListener("DOMContentLoaded", () => {
+        const style = document.createElement("style");
+        style.textContent = "canvas { opacity: 1 !important }";
+        document.head.append(style);
+    });
+"""
+"""Shows the three-dimensional picture at once: viser fades it in, a little with each picture that
+it draws, which takes minutes on a busy machine without a graphics card."""
 
 _DRAWS_NOTHING = """
     for (const of of ["Elements", "Arrays", "ElementsInstanced", "ArraysInstanced"])
@@ -36,6 +43,7 @@ def opened(browser, address, *, draws=True, **context):
     whose picture nobody looks at need not.
     """
     page = browser.new_context(viewport={"width": 1000, "height": 640}, **context).new_page()
+    page.add_init_script(_OPAQUE)
     if not draws:
         page.add_init_script(_DRAWS_NOTHING)
     wrong = []
@@ -67,11 +75,8 @@ def shows_a_robot(points):
 def wait_for_robot(page, name, columns=1.0, rows=1.0):
     """Until the page shows a robot in this share of its columns and rows, from the top left.
 
-    viser fades its canvas in, a little with each picture that it draws: the page itself says when
-    that is over, and only then are screenshots looked at, which take the time for pictures from it.
     The last screenshot is kept as out/screens/NAME.png.
     """
-    page.wait_for_function(_IS_OPAQUE, polling=1000)
 
     def shown():
         points = keep(page, name)
