@@ -3,10 +3,16 @@
 import json
 import sys
 
+import numpy as np
 import pytest
 
 from gaitshift.cli import main
-from gaitshift.lab.benchmark import speed
+from gaitshift.gait import gaits
+from gaitshift.lab.benchmark import peers, speed
+from gaitshift.sim.env import GaitEnv
+from gaitshift.sim.terrain import flat
+
+TROT = gaits.load("trot")
 
 
 def refusal(capsys, *arguments):
@@ -22,7 +28,8 @@ def refusal(capsys, *arguments):
 def test_without_the_baselines_library_one_line_says_so(capsys, monkeypatch):
     for module in ("baseline", "vec_env"):
         monkeypatch.delitem(sys.modules, f"gaitshift.lab.benchmark.{module}", raising=False)
-    for module in [name for name in sys.modules if name.startswith("stable_baselines3")]:
+    loaded = [name for name in sys.modules if name.startswith("stable_baselines3.")]
+    for module in ("stable_baselines3", *loaded):
         monkeypatch.setitem(sys.modules, module, None)
     line = refusal(capsys, "time-to-gait", "--quick")
     assert "stable_baselines3" in line
@@ -69,7 +76,12 @@ def test_the_help_tells_the_measurements_apart(capsys):
     with pytest.raises(SystemExit):
         main(["bench", "--help"])
     told = capsys.readouterr().out
-    words = ("{speed,time-to-gait,page,replay}", "--baseline-budget", "--robots", "--page-seconds")
+    words = (
+        "{speed,growth,peers,time-to-gait,page,replay}",
+        "--baseline-budget",
+        "--robots",
+        "--page-seconds",
+    )
     assert all(word in told for word in words)
 
 
@@ -89,3 +101,33 @@ def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):
     line = refusal(capsys, "time-to-gait", "--quick", "--out", str(tmp_path))
     assert str(table) in line
     assert "must be True or False, got 'yes'" in line
+
+
+def test_growth_is_measured_over_robots_and_threads(capsys, monkeypatch):
+    monkeypatch.setattr(speed, "GROWTH", (2, 5))
+    main(["bench", "growth", "--robots", "3", "--steps", "2", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert {"2 robots", "5 robots", "1 threads"} <= set(found)
+    assert all(one["bare_steps_per_s"] > one["env_steps_per_s"] > 0 for one in found.values())
+
+
+def test_a_peer_moves_as_our_physics_does():
+    """All are given the same joint targets, so that what they are timed at is the same work."""
+    env = GaitEnv(TROT, flat(20.0, 20.0), 2)
+    env.reset(seed=0)
+    targets = np.random.default_rng(0).normal(env.robot.stance_angles, 0.1, (5, 2, 12))
+    robots = [make() for make in peers.makers(env)]
+    for robot in robots:
+        robot.reset()
+    for target in targets:
+        env.world.step(target)
+        seen = [robot.step(one)[0] for robot, one in zip(robots, target, strict=True)]
+    np.testing.assert_allclose(seen, np.hstack(env.world.state()), atol=1e-9)
+
+
+@pytest.mark.slow
+def test_peers_are_measured_beside_ours(capsys):
+    main(["bench", "peers", "--robots", "2", "--steps", "2", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["gaitshift", *peers.PEERS]
+    assert min(found.values()) > 0

@@ -27,6 +27,7 @@ from gaitshift.lab.benchmark.speed import (
     EPISODES,
     SpeedConfig,
     environment_speed,
+    growth,
     replay_speed,
     training_speed,
 )
@@ -80,18 +81,24 @@ class Bench:
     survival ≥ 0.99, speed within 0.1 m/s and pattern fraction ≥ 0.6, compared with PPO of
     stable-baselines3 at its defaults with 30 robots. Takes hours, most of them for the baseline.
 
+    growth: the same for 32 to 4096 robots, and for one thread to one a core.
+
+    peers: steps per second beside the same robot in Gymnasium's AsyncVectorEnv, in
+    stable-baselines3's SubprocVecEnv and in mujoco.rollout, in turns.
+
     page: whether the page of `gaitshift view` runs in real time on one core at 50 frames per
     second.
 
     replay: how long `identify` takes for 1000 episodes of 20 s, 100 α and 1000 β.
     """
 
-    what: Annotated[Literal["speed", "time-to-gait", "page", "replay"], tyro.conf.Positional] = (
-        "speed"
-    )
+    what: Annotated[
+        Literal["speed", "growth", "peers", "time-to-gait", "page", "replay"],
+        tyro.conf.Positional,
+    ] = "speed"
     """What to measure."""
     speed: SpeedConfig = field(default_factory=SpeedConfig)
-    """For `bench speed`."""
+    """For `bench speed`, `growth` and `peers`."""
     time_to_gait: TimeToGaitOptions = field(default_factory=TimeToGaitOptions)
     """For `bench time-to-gait`."""
     page_seconds: float = 20.0
@@ -103,6 +110,10 @@ class Bench:
         """Measures and prints."""
         if self.what == "speed":
             self._measure_speed()
+        elif self.what == "growth":
+            self._measure_growth()
+        elif self.what == "peers":
+            self._measure_peers()
         elif self.what == "page":
             self._measure_page()
         elif self.what == "replay":
@@ -125,6 +136,38 @@ class Bench:
             for name, value in figures.items()
         ]
         emit_table(f"bench: {self.speed.robots} robots on {self.speed.terrain}", rows)
+
+    def _measure_growth(self) -> None:
+        with progress("measuring") as report:
+            found = growth(self.speed, report)
+        if self.json:
+            emit_json(found)
+            return
+        rows = [
+            (
+                name,
+                f"{figures['env_steps_per_s']:,.0f} steps/s",
+                f"{figures['env_over_bare']:.2f} of bare physics",
+            )
+            for name, figures in found.items()
+        ]
+        emit_table(f"bench: growth on {self.speed.terrain}", rows)
+
+    def _measure_peers(self) -> None:
+        from gaitshift.lab.benchmark.peers import OURS, peer_speeds  # starts processes
+
+        with progress("measuring") as report:
+            found = peer_speeds(self.speed, report)
+        if self.json:
+            emit_json(found)
+            return
+        rows = [
+            (name, f"{rate:,.0f} steps/s", f"{found[OURS] / rate:.2f}")
+            for name, rate in found.items()
+        ]
+        emit_table(
+            f"bench: {self.speed.robots} robots on {self.speed.terrain}, gaitshift over each", rows
+        )
 
     def _measure_page(self) -> None:
         try:

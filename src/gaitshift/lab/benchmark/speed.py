@@ -1,8 +1,9 @@
 """Speed of the environment, of bare physics, of training, and of replays of a rule on a grid."""
 
+import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 
 import numpy as np
@@ -17,6 +18,9 @@ from gaitshift.sim.terrain import from_spec
 
 ROUNDS = 7
 """Rounds in which both are measured alternately; the results are medians over them."""
+
+GROWTH = (32, 128, 512, 2048, 4096)
+"""Numbers of robots whose speed `growth` measures."""
 
 EPISODES, EPISODE_SECONDS = 1000, 20.0
 ALPHAS, BETAS = np.linspace(0.002, 0.2, 100), np.arange(1000.0)
@@ -47,22 +51,25 @@ class SpeedConfig:
 
 
 def environment_speed(
-    config: SpeedConfig, report: Callable[[int, int], None] = lambda done, total: None
+    config: SpeedConfig,
+    report: Callable[[int, int], None] = lambda done, total: None,
+    threads: int = 0,
 ) -> dict[str, float]:
     """Control steps per second, summed over all robots [1/s], and their ratio.
 
-    Environment and bare physics compute the same motion, with the same small random actions.
+    Environment and bare physics compute the same motion, with the same small random actions, on
+    this number of threads (0: one a core).
     """
     ground = from_spec(config.terrain, seed=config.seed, length=20.0, width=20.0)
-    env = GaitEnv(gaits.load("trot"), ground, config.robots)
+    env = GaitEnv(gaits.load("trot"), ground, config.robots, threads=threads)
     env.reset(seed=config.seed)
     rng = np.random.default_rng(config.seed)
     actions = rng.normal(scale=0.5, size=(config.steps, config.robots, 12))
-    bare = _Bare(env, actions)
+    bare = _Bare(env, actions, threads)
     seconds: dict[str, list[float]] = {"env": [], "bare": []}
     for index in range(ROUNDS):
-        seconds["env"].append(_time(lambda: [env.step(action) for action in actions]))
-        seconds["bare"].append(_time(bare.run))
+        seconds["env"].append(seconds_of(lambda: [env.step(action) for action in actions]))
+        seconds["bare"].append(seconds_of(bare.run))
         report(index + 1, ROUNDS + 1)
     total = config.robots * config.steps
     env_rate, bare_rate = (total / median(seconds[name]) for name in ("env", "bare"))
@@ -72,6 +79,29 @@ def environment_speed(
         "env_steps_per_s": env_rate,
         "env_over_bare": median(ratios),
     }
+
+
+def growth(
+    config: SpeedConfig, report: Callable[[int, int], None] = lambda done, total: None
+) -> dict[str, dict[str, float]]:
+    """`environment_speed` for more and more robots, and for more and more threads.
+
+    A round has as many control steps over all robots as `config` has.
+    """
+    total, cores = config.robots * config.steps, os.cpu_count() or 1
+    cases = {f"{robots} robots": (robots, 0) for robots in GROWTH}
+    cases |= {f"{threads} threads": (config.robots, threads) for threads in _doubled(cores)}
+    found: dict[str, dict[str, float]] = {}
+    for name, (robots, threads) in cases.items():
+        one = replace(config, robots=robots, steps=max(2, total // robots))
+        found[name] = environment_speed(one, threads=threads)
+        report(len(found), len(cases))
+    return found
+
+
+def _doubled(most: int) -> list[int]:
+    """1, 2, 4 … up to `most`, and `most` itself."""
+    return sorted({most, *(1 << power for power in range(most.bit_length()))})
 
 
 def training_speed(seed: int) -> dict[str, float]:
@@ -92,7 +122,7 @@ def training_speed(seed: int) -> dict[str, float]:
     learner = Learner(env, recipe)
     learner.start_episodes(seed)
     learner.iterate()
-    per_iteration = median([_time(learner.iterate) for _ in range(ROUNDS)])
+    per_iteration = median([seconds_of(learner.iterate) for _ in range(ROUNDS)])
     flat = recipe.stages[0].iterations
     return {
         "training_steps_per_s": recipe.robots * recipe.steps / per_iteration,
@@ -104,9 +134,9 @@ def training_speed(seed: int) -> dict[str, float]:
 class _Bare:
     """MuJoCo's own batch on the same model with the same joint targets, and nothing else."""
 
-    def __init__(self, env: GaitEnv, actions: np.ndarray) -> None:
+    def __init__(self, env: GaitEnv, actions: np.ndarray, threads: int) -> None:
         world = env.world
-        self._batch = Batch(world.model, env.num_envs)
+        self._batch = Batch(world.model, env.num_envs, threads, True)
         self._batch.bind("qpos")[:], self._batch.bind("qvel")[:] = world.state()
         self._ctrl = self._batch.bind("ctrl")
         self._targets = env.robot.stance_angles + env.robot.action_scale * actions
@@ -118,7 +148,8 @@ class _Bare:
             self._batch.step(nstep=self._substeps)
 
 
-def _time(work: Callable[[], object]) -> float:
+def seconds_of(work: Callable[[], object]) -> float:
+    """Time that the work takes [s]."""
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
