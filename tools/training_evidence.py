@@ -29,7 +29,7 @@ from gaitshift.lab.reproduction.plan import Job, Setting
 from gaitshift.lab.reproduction.training import train_all
 from gaitshift.lab.studies.transitions import Pair, run_pair
 from gaitshift.learn.recipe import Recipe
-from gaitshift.learn.run import POLICY
+from gaitshift.learn.run_folder import POLICY
 from gaitshift.sim.reward import ADDITIONS, BONUS_SHARES
 from gaitshift.table import markdown
 

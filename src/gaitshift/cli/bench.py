@@ -128,21 +128,18 @@ class Bench:
                 figures |= training_speed(self.speed.seed)
             except ImportError as error:
                 say(f"training is not measured: the package '{error.name}' is missing")
-        if self.json:
-            emit_json(figures)
-            return
         rows = [
             (name, f"{value:,.2f}" if value < 10 else f"{value:,.0f}")
             for name, value in figures.items()
         ]
-        emit_table(f"bench: {self.speed.robots} robots on {self.speed.terrain}", rows)
+        self._emit(figures, f"bench: {self.speed.robots} robots on {self.speed.terrain}", rows)
+
+    def _emit(self, figures: object, title: str, rows: list[tuple[str, ...]]) -> None:
+        emit_json(figures) if self.json else emit_table(title, rows)
 
     def _measure_growth(self) -> None:
         with progress("measuring") as report:
             found = growth(self.speed, report)
-        if self.json:
-            emit_json(found)
-            return
         rows = [
             (
                 name,
@@ -151,22 +148,21 @@ class Bench:
             )
             for name, figures in found.items()
         ]
-        emit_table(f"bench: growth on {self.speed.terrain}", rows)
+        self._emit(found, f"bench: growth on {self.speed.terrain}", rows)
 
     def _measure_peers(self) -> None:
         from gaitshift.lab.benchmark.peers import OURS, peer_speeds  # starts processes
 
         with progress("measuring") as report:
             found = peer_speeds(self.speed, report)
-        if self.json:
-            emit_json(found)
-            return
         rows = [
             (name, f"{rate:,.0f} steps/s", f"{found[OURS] / rate:.2f}")
             for name, rate in found.items()
         ]
-        emit_table(
-            f"bench: {self.speed.robots} robots on {self.speed.terrain}, gaitshift over each", rows
+        self._emit(
+            found,
+            f"bench: {self.speed.robots} robots on {self.speed.terrain}, gaitshift over each",
+            rows,
         )
 
     def _measure_page(self) -> None:
@@ -182,15 +178,13 @@ class Bench:
             for robots in ROBOTS:
                 found[robots] = page_speed(robots, self.page_seconds, policies)
                 report(len(found), len(ROBOTS))
-        if self.json:
-            emit_json({f"robots_{robots}": figures for robots, figures in found.items()})
-            return
-        rows = [
+        rows: list[tuple[str, ...]] = [
             (f"{name}, robots: {robots}", f"{value:.2f}")
-            for robots, figures in found.items()
-            for name, value in figures.items()
+            for robots, of in found.items()
+            for name, value in of.items()
         ]
-        emit_table("bench: the live page on one core", rows)
+        figures = {f"robots_{robots}": of for robots, of in found.items()}
+        self._emit(figures, "bench: the live page on one core", rows)
 
     def _measure_replay(self) -> None:
         try:
@@ -199,12 +193,11 @@ class Bench:
             raise GaitshiftError(
                 f"the replay needs the package '{error.name}'; install gaitshift[identify]"
             ) from error
-        if self.json:
-            emit_json(seconds)
-            return
         what = f"{EPISODES} episodes, {len(ALPHAS)} α, {len(BETAS)} β"
-        emit_table(
-            "bench: replay", [(f"{what}, {name}", f"{x:.1f}") for name, x in seconds.items()]
+        self._emit(
+            seconds,
+            "bench: replay",
+            [(f"{what}, {name}", f"{x:.1f}") for name, x in seconds.items()],
         )
 
     def _measure_time_to_gait(self) -> None:
@@ -226,10 +219,11 @@ class Bench:
                     table.write(out / TABLE, [row_of(one) for one in rows], COLUMNS)
                     _draw([one for one in rows if is_of(config, one)], out)
         found = summary(outcomes)
-        if self.json:
-            emit_json({"check": asdict(config.check), "gaits": found})
-            return
-        emit_table("time to gait, median over seeds (all seeds)", _rows(found))
+        self._emit(
+            {"check": asdict(config.check), "gaits": found},
+            "time to gait, median over seeds (all seeds)",
+            _rows(found),
+        )
 
     def _known(self, path: Path) -> list[Outcome]:
         """The outcomes in an earlier table."""
@@ -265,8 +259,8 @@ def _text(outcome: Outcome) -> str:
     )
 
 
-def _rows(found: dict[str, Any]) -> list[tuple[str, str]]:
-    rows: list[tuple[str, str]] = []
+def _rows(found: dict[str, Any]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
     for gait, entry in found.items():
         for learner, median in entry["learners"].items():
             bound = "" if median["reached"] else "> "

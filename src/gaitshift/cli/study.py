@@ -10,16 +10,15 @@ from typing import Any
 from gaitshift.cli.output import (
     README,
     check_numbers,
-    check_table_folder,
     emit_json,
     emit_table,
     progress,
     say,
 )
+from gaitshift.cli.resumable import resumable_table
 from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
-from gaitshift.folder_lock import only_writer
-from gaitshift.lab.resume import Report, ResumableTable, run_missing
+from gaitshift.lab.resume import Report, run_missing
 from gaitshift.table import Row
 from gaitshift.whole_file import write_text
 
@@ -76,17 +75,14 @@ class Study(RobotOptions):
                 raise GaitshiftError(f"amplitudes must be 0 to 1 m, got {amplitude:g}")
         every = strategies(self.flat_gait, self.rough_gait, self.conditions)
         loaded = self.load_policies((self.flat_gait, self.rough_gait))
-        path = self.out / TABLE
-        with only_writer(self.out):
-            check_table_folder(path, overwrite=self.overwrite)
-            table = ResumableTable.open(
-                path,
-                COLUMNS,
-                "crossings",
-                key=("amplitude", "way"),
-                same={"seed": self.seed, "runs": self.runs},
-                overwrite=self.overwrite,
-            )
+        with resumable_table(
+            self.out / TABLE,
+            COLUMNS,
+            "crossings",
+            key=("amplitude", "way"),
+            same={"seed": self.seed, "runs": self.runs},
+            overwrite=self.overwrite,
+        ) as table:
 
             def crossed(way: Strategy, amplitude: float, report: Report) -> Row:
                 crossings = cross(

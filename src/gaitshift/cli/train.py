@@ -148,7 +148,7 @@ class _Bar:
 
     def __init__(self, run: "Run") -> None:
         from gaitshift.learn.progress import last
-        from gaitshift.learn.run import PROGRESS, VERDICTS
+        from gaitshift.learn.run_folder import PROGRESS, VERDICTS
 
         self.row: Row = last(run.folder / PROGRESS, run.iteration)
         """The last line of progress.csv."""

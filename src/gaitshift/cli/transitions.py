@@ -13,16 +13,15 @@ import tyro
 from gaitshift.cli.output import (
     README,
     check_numbers,
-    check_table_folder,
     emit_json,
     emit_table,
     progress,
     say,
 )
+from gaitshift.cli.resumable import resumable_table
 from gaitshift.cli.robot_options import RobotOptions
 from gaitshift.errors import GaitshiftError
-from gaitshift.folder_lock import only_writer
-from gaitshift.lab.resume import Report, ResumableTable, run_missing
+from gaitshift.lab.resume import Report, run_missing
 from gaitshift.sim.terrain import from_spec
 from gaitshift.table import Row
 from gaitshift.whole_file import write_text
@@ -70,17 +69,14 @@ class Transitions(RobotOptions):
         loaded = self.load_policies(names)
         for ground in self.grounds:
             from_spec(ground, seed=self.seed, length=9.0, width=9.0)  # checks all specs first
-        path = self.out / TABLE
-        with only_writer(self.out):
-            check_table_folder(path, overwrite=self.overwrite)
-            table = ResumableTable.open(
-                path,
-                COLUMNS,
-                "shifts",
-                key=("old", "new", "ground"),
-                same={"seed": self.seed, "switches": self.switches},
-                overwrite=self.overwrite,
-            )
+        with resumable_table(
+            self.out / TABLE,
+            COLUMNS,
+            "shifts",
+            key=("old", "new", "ground"),
+            same={"seed": self.seed, "switches": self.switches},
+            overwrite=self.overwrite,
+        ) as table:
 
             def shifted(pair: Pair, ground: str, report: Report) -> Row:
                 outcomes = run_pair(

@@ -2,7 +2,6 @@
 
 import json
 import platform
-import shutil
 import time
 from collections.abc import Callable
 from copy import deepcopy
@@ -19,26 +18,29 @@ from torch.utils.tensorboard import SummaryWriter
 from gaitshift import table
 from gaitshift.data import json_in, located
 from gaitshift.errors import GaitshiftError
-from gaitshift.folder_lock import LOCK
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
 from gaitshift.learn.ground import FIELD, draw_grounds
 from gaitshift.learn.learner import Learner
 from gaitshift.learn.progress import last, trim
 from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.run_folder import (
+    CHECKPOINTS,
+    CONFIG,
+    DIVERGED,
+    POLICY,
+    PROGRESS,
+    VERDICTS,
+    clear,
+    is_barely_begun,
+)
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.sim.world import Divergence
 from gaitshift.table import Row
-from gaitshift.whole_file import PART, flush_to_disk, replacing, write_text
-
-CONFIG, CHECKPOINTS, POLICY = "config.json", "checkpoints", "policy.onnx"
-PROGRESS, VERDICTS, DIVERGED = "progress.csv", "verdicts.csv", "diverged"
-
-_CONFIG_START = b'{\n  "command": '
-"""How each of our config files begins."""
+from gaitshift.whole_file import flush_to_disk, replacing, write_text
 
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
@@ -108,13 +110,13 @@ class Run:
                 f"mini_batches must be 1 to robots × steps, {samples}, got "
                 f"{recipe.ppo.mini_batches}"
             )
-        if folder.exists() and not (folder.is_dir() and _is_barely_begun(folder)):
+        if folder.exists() and not (folder.is_dir() and is_barely_begun(folder)):
             if not overwrite:
                 raise GaitshiftError(
                     f"{folder} exists and is not empty; give another --out, --overwrite, "
                     f"or --resume {folder}"
                 )
-            _clear(folder)
+            clear(folder)
         folder.mkdir(parents=True, exist_ok=True)  # first: without a folder nothing else can work
         run = cls(folder, machine, recipe, seed, command, robot)
         config = {
@@ -153,7 +155,7 @@ class Run:
         checkpoints = run._checkpoints()
         if checkpoints:
             run._load_checkpoint(checkpoints[-1])
-        elif _is_barely_begun(folder):
+        elif is_barely_begun(folder):
             run._save_checkpoint()
         else:
             raise GaitshiftError(f"{folder / CHECKPOINTS} has no checkpoint to resume from")
@@ -350,25 +352,3 @@ def _seed_at(seed: int, iteration: int) -> int:
 def _versions() -> dict[str, str]:
     packages = ("gaitshift", "mujoco-core", "numpy", "torch", "rsl-rl-lib", "gymnasium")
     return {"python": platform.python_version(), **{name: version(name) for name in packages}}
-
-
-def _is_barely_begun(folder: Path) -> bool:
-    """Whether a run ended in this folder before its first checkpoint, or nothing is in it."""
-    if {path.name for path in folder.iterdir()} - {CONFIG, CONFIG + PART, CHECKPOINTS, LOCK}:
-        return False
-    if any(path.suffix != PART for path in (folder / CHECKPOINTS).glob("*")):
-        return False
-    config = folder / CONFIG
-    text = config.read_bytes()[: len(_CONFIG_START)] if config.is_file() else b""
-    return _CONFIG_START.startswith(text)
-
-
-def _clear(folder: Path) -> None:
-    """Deletes the folder of an earlier run; `GaitshiftError` where the folder holds no run."""
-    if not (folder / CONFIG).is_file():
-        raise GaitshiftError(f"{folder} is not a training run and is not overwritten")
-    for path in folder.iterdir():
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        elif path.name != LOCK:
-            path.unlink()

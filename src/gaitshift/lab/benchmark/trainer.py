@@ -4,7 +4,8 @@ from pathlib import Path
 
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.recipe import Recipe
-from gaitshift.learn.run import POLICY, Run
+from gaitshift.learn.run import Run
+from gaitshift.learn.run_folder import POLICY
 
 
 class GaitshiftTrainer:

@@ -12,7 +12,7 @@ from gaitshift.lab.log import Log
 from gaitshift.lab.reproduction.learning_curve import DECIMALS
 from gaitshift.lab.reproduction.plan import ABLATED, ABLATIONS, PAPER, REFERENCE, Setting
 from gaitshift.lab.reproduction.results import EarlierRuns, Results, Seeds, fingerprint
-from gaitshift.learn.run import POLICY
+from gaitshift.learn.run_folder import POLICY
 from gaitshift.table import Row
 
 FIGURES = (

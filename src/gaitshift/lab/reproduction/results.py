@@ -19,7 +19,7 @@ from gaitshift.lab.reproduction.learning_curve import (
 )
 from gaitshift.lab.reproduction.plan import ABLATED, ABLATIONS, GAITS, PAPER, Job, Plan
 from gaitshift.lab.reproduction.training import FAILED, is_over
-from gaitshift.learn.run import PROGRESS
+from gaitshift.learn.run_folder import PROGRESS
 
 RUNS_FILE, CURVES_FILE, GAITS_FILE = "runs.csv", "curves.csv", "gaits.csv"
 

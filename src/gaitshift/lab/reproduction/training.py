@@ -21,7 +21,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.folder_lock import only_writer
 from gaitshift.lab.reproduction.plan import Job
 from gaitshift.learn.learner import DivergedError
-from gaitshift.learn.run import CHECKPOINTS, CONFIG, POLICY, PROGRESS, Run
+from gaitshift.learn.run import Run
+from gaitshift.learn.run_folder import CHECKPOINTS, CONFIG, POLICY, PROGRESS
 from gaitshift.whole_file import write_text
 
 FAILED = "failed.txt"

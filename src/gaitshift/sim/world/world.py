@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, cast
 
 import mujoco
 import numpy as np
@@ -12,65 +11,20 @@ from mujoco.batch import Batch
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import Gains, Robot
+from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.sensors import POSE, TWIST, sense
-from gaitshift.sim.terrain import Fields, Terrain, to_unit_interval
+from gaitshift.sim.terrain import Fields, Terrain
 from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
-
-GROUND = "ground"
-"""Name of the ground's geom."""
-
-FRICTION = 0.8
-"""Sliding friction of the ground, as in the robot's URDF; the robot's own shapes have priority."""
-
-
-Fidelity = Literal["exact", "coarse"]
-FIDELITIES: tuple[Fidelity, ...] = ("exact", "coarse")
-"""How finely contacts are simulated: by the step, the friction cones and the slip correction of the
-robot's model, or coarsely, in less than half the time. Standing feet then creep by millimetres a
-second, so nothing is judged by it."""
-
-COARSE_STEP = 0.005
-"""Time step of coarse physics [s]; ours: two make a control step."""
-
-COARSE_IMPEDANCE = (0.98, 0.99, 0.001)
-"""First values of solimp in coarse physics; ours: with MuJoCo's own, 0.9 to 0.95, feet creep
-three times as fast."""
-
-
-def build_model(
-    robot: Robot, gains: Gains, terrain: Terrain, fidelity: Fidelity = "exact"
-) -> mujoco.MjModel:
-    """The model of one robot on one terrain, without the shapes that are only drawn.
-
-    Level ground is a plane, which is faster and has no border; everything else a height field.
-    """
-    spec = robot.spec(gains)
-    spec.compiler.discardvisual = True
-    if fidelity == "coarse":
-        spec.option.timestep = COARSE_STEP
-        spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
-        spec.option.noslip_iterations = 0
-        for geom in cast("list[mujoco.MjsGeom]", spec.geoms):
-            geom.solimp[:3] = COARSE_IMPEDANCE
-    ground = spec.worldbody.add_geom(name=GROUND, contype=1, conaffinity=0)
-    ground.friction[0] = FRICTION
-    if terrain.is_flat:
-        ground.type = mujoco.mjtGeom.mjGEOM_PLANE
-        ground.pos[2] = float(terrain.height[0, 0])
-        ground.size[:] = (0.0, 0.0, 1.0)
-    else:
-        field = to_unit_interval(terrain)
-        rows, cols = field.data.shape
-        spec.add_hfield(
-            name=GROUND, nrow=rows, ncol=cols, size=field.size, userdata=field.data.ravel().tolist()
-        )
-        ground.type = mujoco.mjtGeom.mjGEOM_HFIELD
-        ground.hfieldname = GROUND
-        ground.pos[:] = field.position
-    return spec.compile()
-
+from gaitshift.sim.world.limits import (
+    MOST_ANGLE,
+    MOST_DISTANCE,
+    MOST_FORCE,
+    MOST_YAW,
+    check_unit,
+    check_within,
+)
+from gaitshift.sim.world.model import Fidelity, build_model
 
 CONTACT_FORCE = 1.0
 """A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
@@ -78,18 +32,6 @@ value of legged_gym."""
 
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are posed before they are set on the ground [m]; ours."""
-
-MOST_ANGLE = 20.0
-"""Greatest joint angle or joint target [rad]; ours: three turns, more than any joint has."""
-
-MOST_FORCE = 10_000.0
-"""Greatest force on a base [N]; ours: ten times the hardest push of `PushConfig`."""
-
-MOST_DISTANCE = 100_000.0
-"""Greatest coordinate of a base [m]; ours: positions still resolve 0.1 nm."""
-
-MOST_YAW = 1000.0
-"""Greatest yaw of a base [rad]; ours: more turns than a robot makes in a day."""
 
 _LOG = logging.getLogger(__name__)
 
@@ -175,8 +117,8 @@ class World:
         Raises:
             GaitshiftError: a value is outside its range; the state is then unchanged.
         """
-        _check("positions", "m or rad", qpos, MOST_DISTANCE)
-        _check("velocities", "m/s or rad/s", qvel, FASTEST)
+        check_within("positions", "m or rad", qpos, MOST_DISTANCE)
+        check_within("velocities", "m/s or rad/s", qvel, FASTEST)
         self._qpos[:], self._qvel[:] = qpos, qvel
         self._settle(np.arange(self.n))
 
@@ -208,15 +150,15 @@ class World:
             GaitshiftError: a value is outside its range, or `attitude` is no unit quaternion; the
                 state is then unchanged.
         """
-        _check("xy of robots", "m", xy, MOST_DISTANCE, ids)
-        _check("yaw of robots", "rad", yaw, MOST_YAW, ids)
+        check_within("xy of robots", "m", xy, MOST_DISTANCE, ids)
+        check_within("yaw of robots", "rad", yaw, MOST_YAW, ids)
         if joint_position is not None:
-            _check("joint positions", "rad", joint_position, MOST_ANGLE, ids)
+            check_within("joint positions", "rad", joint_position, MOST_ANGLE, ids)
         for values in (joint_velocity, base_velocity_w, base_angular_velocity_b):
             if values is not None:
-                _check("velocities", "m/s or rad/s", values, FASTEST, ids)
+                check_within("velocities", "m/s or rad/s", values, FASTEST, ids)
         if attitude is not None:
-            _check_unit(attitude, ids)
+            check_unit(attitude, ids)
         qpos = np.zeros((len(ids), POSE + 12))
         qpos[:, :2] = xy
         qpos[:, 2] = CLEAR_OF_GROUND  # until the feet are known, so that nothing is in the ground
@@ -245,7 +187,7 @@ class World:
         Raises:
             GaitshiftError: a force is outside ± `MOST_FORCE`; the state is then unchanged.
         """
-        _check("forces", "N", force_w, MOST_FORCE)
+        check_within("forces", "N", force_w, MOST_FORCE)
         self._applied[:, :3] = force_w
 
     def step(self, target: Float[np.ndarray, "N 12"]) -> tuple[Proprioception, Privileged]:
@@ -256,7 +198,7 @@ class World:
         Raises:
             GaitshiftError: a target is outside ± `MOST_ANGLE`; the state is then unchanged.
         """
-        _check("joint targets", "rad", target, MOST_ANGLE, names=self.robot.joint_names)
+        check_within("joint targets", "rad", target, MOST_ANGLE, names=self.robot.joint_names)
         self._history.add(self._qpos, self._qvel)
         self._ctrl[:] = target
         self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
@@ -344,34 +286,3 @@ class World:
         before, after = self._fields, Fields(terrains[: self.n], self.n)
         qpos[:, 2] += (after.height_at(feet) - before.height_at(feet)).max(axis=1)
         return qpos, qvel
-
-
-def _check(
-    what: str,
-    unit: str,
-    values: np.ndarray,
-    most: float,
-    ids: Int[np.ndarray, " K"] | None = None,
-    names: Sequence[str] = (),
-) -> None:
-    """`GaitshiftError` unless all values are within ± `most`, one row a robot (`ids`)."""
-    if (np.abs(values) <= most).all():
-        return
-    row, *column = np.argwhere(~(np.abs(values) <= most))[0].tolist()
-    robot = row if ids is None else int(ids[row])
-    part = f"{names[column[0]]} of " if names else ""
-    value = float(values[(row, *column)])
-    raise GaitshiftError(
-        f"{what} must be {-most:g} to {most:g} {unit}, got {value:g} for {part}robot {robot}"
-    )
-
-
-def _check_unit(attitude: Float[np.ndarray, "K 4"], ids: Int[np.ndarray, " K"]) -> None:
-    """`GaitshiftError` unless these are unit quaternions, one row a robot (`ids`)."""
-    length = np.linalg.norm(attitude, axis=1)
-    wrong = np.flatnonzero(~(np.abs(length - 1.0) <= 1e-3))
-    if wrong.size:
-        raise GaitshiftError(
-            f"attitudes must be unit quaternions, got length {length[wrong[0]]:g} for robot "
-            f"{ids[wrong[0]]}"
-        )
