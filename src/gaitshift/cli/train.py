@@ -4,8 +4,10 @@ import shlex
 import sys
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from gaitshift.cli.output import emit_json, say
 from gaitshift.cli.robot_options import RobotOption
+from gaitshift.cli.watch import PUBLISH_EVERY, Watch
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.folder_lock import only_writer
@@ -58,6 +61,10 @@ class Train(RobotOption):
     """Continue the run in this folder, with its own settings."""
     overwrite: bool = False
     """Replace an earlier run in the folder."""
+    watch: bool = False
+    """A page in the browser shows the robot walk as it learns."""
+    port: int = 8080
+    """Port of the page."""
     json: bool = False
     """One JSON object on stdout: the last line of progress.csv, the last verdict, and the policy's
     path."""
@@ -69,8 +76,9 @@ class Train(RobotOption):
             run = begin(folder)
             bar = _Bar(run)
             try:
-                with bar:
-                    path = run.train(bar, bar.judge, bar.keep)
+                with self._page(run), bar:
+                    every = PUBLISH_EVERY if self.watch else inf
+                    path = run.train(bar, bar.judge, bar.keep, publish_every=every)
             except KeyboardInterrupt as stop:
                 command = f"gaitshift train --resume {folder}"
                 raise type(stop)(f"interrupted; continue with: {command}") from None
@@ -80,6 +88,13 @@ class Train(RobotOption):
         if bar.verdict:
             print(f"{_spell(bar.verdict)}, {bar.verdict['misses'] or 'no limit missed'}")
         print(f"policy written to {path}; evaluate it with: gaitshift evaluate {path}")
+
+    def _page(self, run: "Run") -> AbstractContextManager[None]:
+        """The page of the training, if it is asked for."""
+        if not self.watch:
+            return nullcontext()
+        run.export()
+        return Watch(run.folder, self.port)
 
     def _beginning(self) -> tuple[Path, "Callable[[Path], Run]"]:
         """The folder of the run, and what begins or resumes it there."""
@@ -129,7 +144,10 @@ class Train(RobotOption):
 
     def _refuse_settings(self) -> None:
         for field in fields(Train):
-            if field.name in ("resume", "json") or getattr(self, field.name) == field.default:
+            if (
+                field.name in ("resume", "watch", "port", "json")
+                or getattr(self, field.name) == field.default
+            ):
                 continue
             names = {"gait": "a gait", "settings": "--set"}
             option = names.get(field.name, f"--{field.name.replace('_', '-')}")

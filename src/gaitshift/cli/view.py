@@ -1,6 +1,7 @@
 """`gaitshift view`: robots that walk in the browser, live or from a log."""
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,18 +15,22 @@ from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.shift.graph_file import DEFAULT
 
+RECORDINGS = Path("gaitshift-view")
+"""Folder for recordings."""
+
 _LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 @dataclass(frozen=True, kw_only=True)
 class View(RobotOptions):
-    """Show robots in the browser: a live simulation with controls, or a log.
+    """Show robots in the browser: a live simulation with controls, a log, or a training.
 
     Prints the address of the page; Ctrl-C ends it. Needs no display and no OpenGL.
     """
 
     log: Annotated[Path | None, tyro.conf.Positional] = None
-    """Log of `demo`, `evaluate`, `record` or `view`; without it, a live simulation."""
+    """Log of `demo`, `evaluate`, `record` or `view`, or folder of a training, which may go on;
+    without it, a live simulation."""
     track: str = DemoConfig.track
     """Terrain: pieces with lengths in metres."""
     robots: int = 1
@@ -38,7 +43,7 @@ class View(RobotOptions):
     """Address to listen on; a public address lets others use the controls."""
     port: int = 8080
     """Port to listen on."""
-    out: Path = Path("gaitshift-view")
+    out: Path = RECORDINGS
     """Folder for recordings."""
 
     def run(self) -> None:
@@ -50,6 +55,7 @@ class View(RobotOptions):
                 LivePage,
                 LiveRun,
                 ReplayPage,
+                Training,
                 address_of,
                 close,
                 serve,
@@ -58,7 +64,8 @@ class View(RobotOptions):
             raise GaitshiftError(
                 f"view needs the package '{error.name}'; install gaitshift[view]"
             ) from error
-        robot = self.read_robot()
+        training = Training(self._only_shown()) if self.log and self.log.is_dir() else None
+        robot = training.robot if training is not None else self.read_robot()
         if robot == ANYMAL_B and not has_meshes(robot):
             say("drawn with simple shapes; install gaitshift[meshes] (130 MB) for meshes")
         config = LiveConfig(
@@ -67,13 +74,13 @@ class View(RobotOptions):
             condition=self.condition,
             seed=self.seed,
         )
-        if self.log is None:
+        if training is not None:
+            shown = training.live()
+        elif self.log is None:
             gaits = tuple(dict.fromkeys((*self.known_gaits(), *config.graph.gaits)))
             shown = LiveRun(config, self.load_policies(_in_order(gaits)))
-        elif self.policy_files:
-            raise GaitshiftError("a log is shown without policies: no --policy-files")
         else:
-            shown = Log.load(self.log)
+            shown = Log.load(self._only_shown())
         if self.host not in _LOCAL:
             say(f"everyone who can reach {self.host} can see and use this page")
         server = serve(self.host, self.port)
@@ -81,7 +88,8 @@ class View(RobotOptions):
             if isinstance(shown, Log):
                 page = ReplayPage(server, shown, robot)
             else:
-                page = LivePage(server, shown, lambda log: self._save(log, robot))
+                save = partial(save_recording, folder=self.out, robot=robot)
+                page = LivePage(server, shown, save, training)
             print(f"open {address_of(self.host, self.port)} (Ctrl-C ends)", flush=True)
             page.run()
         except KeyboardInterrupt:
@@ -89,19 +97,31 @@ class View(RobotOptions):
         finally:
             close(server)
 
-    def _save(self, log: Log, robot: Robot) -> str:
-        """Saves a recording as a log and as a page; older ones stay."""
-        from gaitshift.show.report import write_report  # matplotlib is slow to import
+    def _only_shown(self) -> Path:
+        """The log or the training's folder.
 
-        self.out.mkdir(parents=True, exist_ok=True)
-        number = 1
-        while (self.out / f"log-{number}.npz").exists():
-            number += 1
-        path, page = self.out / f"log-{number}.npz", self.out / f"run-{number}.html"
-        log.save(path)
-        write_report(log, page, description=robot)
-        say(f"recorded {path} and {page}")
-        return f"saved {page} and {path}; play the log with: gaitshift view {path}"
+        Raises:
+            GaitshiftError: options are given that it has no use for.
+        """
+        assert self.log is not None
+        if self.policy_files:
+            raise GaitshiftError(f"{self.log} is shown without policies: no --policy-files")
+        return self.log
+
+
+def save_recording(log: Log, folder: Path, robot: Robot) -> str:
+    """Saves a recording as a log and as a page, and returns a line that says where."""
+    from gaitshift.show.report import write_report  # matplotlib is slow to import
+
+    folder.mkdir(parents=True, exist_ok=True)
+    number = 1
+    while (folder / f"log-{number}.npz").exists():
+        number += 1
+    path, page = folder / f"log-{number}.npz", folder / f"run-{number}.html"
+    log.save(path)
+    write_report(log, page, description=robot)
+    say(f"recorded {path} and {page}")
+    return f"saved {page} and {path}; play the log with: gaitshift view {path}"
 
 
 def _in_order(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import asdict
 from importlib.metadata import version
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,6 @@ import torch
 from torch.utils.tensorboard import SummaryWriter
 
 from gaitshift import table
-from gaitshift.data import json_in, located
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.export import describe, export
@@ -33,6 +33,7 @@ from gaitshift.learn.run_folder import (
     VERDICTS,
     clear,
     is_barely_begun,
+    read_config,
 )
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import from_dict, to_dict
@@ -136,10 +137,7 @@ class Run:
     @classmethod
     def resume(cls, folder: Path) -> "Run":
         """The run of a folder, as it was at its last checkpoint."""
-        if not (folder / CONFIG).is_file():
-            raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}")
-        with located(f"{folder / CONFIG} is damaged"):
-            config: Any = json_in(folder / CONFIG)
+        config = read_config(folder)
         try:
             machine = RewardMachine.from_dict(config["machine"])
             recipe = _STRICT.structure(config["recipe"], Recipe)
@@ -166,12 +164,14 @@ class Run:
         report: Callable[[Row], None] = lambda row: None,
         judge: Judge | None = None,
         keep: Keep | None = None,
+        publish_every: float = inf,
     ) -> Path:
         """Runs to the end, calling `report` after each iteration; gives the policy's path.
 
         At each checkpoint the policy is written for `judge`, and its verdict is saved. If a kill
         prevented the verdict of the present checkpoint, that one is made first. With `keep`, the
-        first `MOST_FILES` divergences are written to `diverged/ITERATION-ROBOT.npz`.
+        first `MOST_FILES` divergences are written to `diverged/ITERATION-ROBOT.npz`. The policy is
+        also written every `publish_every` seconds, for those who watch.
         After Ctrl-C the last checkpoint and the present policy are on disk.
         """
         writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
@@ -180,6 +180,7 @@ class Run:
         try:
             if judge is not None and self._lacks_verdict():
                 self._write_verdict(judge)
+            published = time.monotonic()
             while self.iteration < self.recipe.iterations:
                 row = self.iterate()
                 self._log(row, writer)
@@ -189,6 +190,9 @@ class Run:
                     self._save_checkpoint()
                     if judge is not None:
                         self._write_verdict(judge)
+                elif time.monotonic() > published + publish_every:
+                    self.export()
+                    published = time.monotonic()
         finally:
             writer.close()
             self.export()

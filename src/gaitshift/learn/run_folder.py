@@ -2,7 +2,9 @@
 
 import shutil
 from pathlib import Path
+from typing import Any, cast
 
+from gaitshift.data import json_in, located
 from gaitshift.errors import GaitshiftError
 from gaitshift.folder_lock import LOCK
 from gaitshift.whole_file import PART
@@ -12,6 +14,22 @@ PROGRESS, VERDICTS, DIVERGED = "progress.csv", "verdicts.csv", "diverged"
 
 _CONFIG_START = b'{\n  "command": '
 """How each of our config files begins."""
+
+
+def read_config(folder: Path) -> dict[str, Any]:
+    """The settings of a run, by the names of its config file.
+
+    Raises:
+        GaitshiftError: the folder has no such file, or the file is damaged.
+    """
+    path = folder / CONFIG
+    if not path.is_file():
+        raise GaitshiftError(f"{folder} is not a training run: it has no {CONFIG}")
+    with located(f"{path} is damaged"):
+        config: Any = json_in(path)
+        if not isinstance(config, dict):
+            raise GaitshiftError(f"it must be a table, got a {type(config).__name__}")
+    return cast("dict[str, Any]", config)
 
 
 def is_barely_begun(folder: Path) -> bool:

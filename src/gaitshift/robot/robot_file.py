@@ -64,18 +64,23 @@ def to_dict(robot: Robot) -> dict[str, Any]:
     return {**asdict(robot), "model_file": str(robot.model_file)}
 
 
-def from_dict(data: dict[str, Any]) -> Robot:
+def from_dict(data: Any) -> Robot:
     """The inverse of `to_dict`.
 
     Raises:
-        GaitshiftError: the file of its model no longer exists.
+        GaitshiftError: something is missing or of another type, or the file of the robot's model no
+            longer exists.
     """
-    gains = {name: Gains(**values) for name, values in data["gains"].items()}
-    path = Path(data["model_file"])
+    try:
+        gains = {name: Gains(**values) for name, values in data["gains"].items()}
+        path = Path(data["model_file"])
+        values = {**data, "gains": gains, "model_file": path, "stance": tuple(data["stance"])}
+        robot = Robot(**cast(dict[str, Any], values))
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise GaitshiftError(f"robot is damaged: {error}") from error
     if not path.is_file():
-        raise GaitshiftError(f"robot '{data['name']}': no model file {path}")
-    values = {**data, "gains": gains, "model_file": path, "stance": tuple(data["stance"])}
-    return Robot(**cast(dict[str, Any], values))
+        raise GaitshiftError(f"robot '{robot.name}': no model file {path}")
+    return robot
 
 
 def _gains(preset: str, data: object) -> Gains:

@@ -7,3 +7,4 @@ from gaitshift.show.viewer.replay_page import ReplayPage as ReplayPage
 from gaitshift.show.viewer.server import address_of as address_of
 from gaitshift.show.viewer.server import close as close
 from gaitshift.show.viewer.server import serve as serve
+from gaitshift.show.viewer.training import Training as Training

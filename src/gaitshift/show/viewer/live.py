@@ -87,7 +87,7 @@ class LiveRun:
         ground = from_spec(
             f"{config.track},flat@{RUN_OUT}", seed=config.seed, length=1.0, width=WIDTH
         )
-        driver = Driver(self._policies, config.robots, start=config.start)
+        self._driver = driver = Driver(self._policies, config.robots, start=config.start)
         switcher = self._switcher(config)
         world = World(driver.robot, ground, config.robots, gains=driver.gains)
         rng = np.random.default_rng(config.seed)
@@ -121,6 +121,11 @@ class LiveRun:
             self._walk.switcher = self._switcher(config)
         self._walk.config = self._rollout(config)
         self.config = config
+
+    def learn(self, policy: Policy) -> None:
+        """Goes on with another policy of the same gait."""
+        self._policies[policy.gait] = policy
+        self._driver.policies[policy.gait] = policy
 
     def take(self, gait: str) -> None:
         """Changes the gait of all robots at once."""
@@ -189,6 +194,8 @@ class LiveRun:
             self._recorder.add()
 
     def _switcher(self, config: LiveConfig) -> Autonomous | None:
+        if not config.is_autonomous:
+            return None
         graph = config.graph
         missing = {*graph.gaits} - {*self._policies}
         if missing:
@@ -198,7 +205,7 @@ class LiveRun:
                 f"condition must be one that robots can sense, got '{config.condition}', which "
                 "needs the truth about the ground"
             )
-        return Autonomous(graph, config.robots) if config.is_autonomous else None
+        return Autonomous(graph, config.robots)
 
     @staticmethod
     def _rollout(config: LiveConfig) -> RolloutConfig:

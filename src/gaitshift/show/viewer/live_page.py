@@ -12,9 +12,16 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.show.geometry import Frame
 from gaitshift.show.viewer.charts import Charts, Tape
 from gaitshift.show.viewer.live import LiveConfig, LiveRun
-from gaitshift.show.viewer.panels import build_condition, build_gaits, build_ground, build_push
+from gaitshift.show.viewer.panels import (
+    build_commands,
+    build_condition,
+    build_gaits,
+    build_ground,
+    build_push,
+)
 from gaitshift.show.viewer.scene import Scene
 from gaitshift.show.viewer.server import TICK, Clock, Orders
+from gaitshift.show.viewer.training import Curves, Training
 
 _CHARTS_EVERY = 6
 """Frames between two updates of the charts."""
@@ -31,9 +38,14 @@ class LivePage:
         server: viser.ViserServer,
         live: LiveRun,
         save: Callable[[Log], str],
+        training: Training | None = None,
     ) -> None:
-        """`save` saves a recording, and returns a line that says where."""
-        self._server, self._save = server, save
+        """`save` saves a recording, and returns a line that says where.
+
+        With a training, whose gait is the only one, the page has its curve, and the robots go on
+        with each new policy.
+        """
+        self._server, self._save, self._training = server, save, training
         self._live = live
         self._scene = Scene(server, live.robot, live.gaits)
         self._tape = Tape()
@@ -55,6 +67,7 @@ class LivePage:
         clock = Clock()
         while not until():
             self._orders.obey(self._refuse)
+            self._learn()
             frame = self._advance()
             if frame is not None:
                 self._scene.draw(frame)
@@ -63,6 +76,17 @@ class LivePage:
                     self._charts.draw(self._tape)
                     self._tell(frame)
             clock.wait()
+
+    def _learn(self) -> None:
+        """Takes the newest policy of the training, if there is one."""
+        policy = self._training.look() if self._training is not None else None
+        if policy is not None:
+            self._live.learn(policy)
+            self._draw_curves()
+
+    def _draw_curves(self) -> None:
+        if self._training is not None:
+            self._curves.draw(self._training)
 
     def _advance(self) -> Frame | None:
         """Runs the steps that are due; returns the last frame, None without a step."""
@@ -84,6 +108,10 @@ class LivePage:
     def _build(self) -> None:
         gui = cast(Any, self._server.gui)
         panel = gui.add_panel()
+        if self._training is not None:
+            with panel.add_tab("Training"):
+                self._curves = Curves(gui)
+            self._draw_curves()
         with panel.add_tab("Signals"):
             self._charts = Charts(self._server, self._live.machines)
         panel.dock_left()
@@ -91,9 +119,12 @@ class LivePage:
         self._status = gui.add_markdown("")
         self._build_clock(gui)
         with gui.add_folder("Gait"):
-            build_gaits(gui, self._orders, self._live)
-        with gui.add_folder("Condition"):
-            build_condition(gui, self._orders, self._live)
+            if self._training is None:
+                build_gaits(gui, self._orders, self._live)
+            build_commands(gui, self._orders, self._live)
+        if self._training is None:
+            with gui.add_folder("Condition"):
+                build_condition(gui, self._orders, self._live)
         with gui.add_folder("Push"):
             build_push(gui, self._orders, self._live)
         with gui.add_folder("Ground", expand_by_default=False):

@@ -17,7 +17,7 @@ _GAITS_A_ROW = 4
 
 
 def build_gaits(gui: Any, orders: Orders, live: LiveRun) -> None:
-    """Controls for the gait, for autonomous shifts and for the commands."""
+    """Controls for the gait and for autonomous shifts."""
     alone = gui.add_checkbox(
         "shifts by itself",
         live.config.is_autonomous,
@@ -28,6 +28,10 @@ def build_gaits(gui: Any, orders: Orders, live: LiveRun) -> None:
     for row in range(0, len(names), _GAITS_A_ROW):
         some = gui.add_button_group("", tuple(names)[row : row + _GAITS_A_ROW])
         orders.on_choice(some, lambda chosen: live.take(names[chosen]))
+
+
+def build_commands(gui: Any, orders: Orders, live: LiveRun) -> None:
+    """Controls for speed and stride frequency."""
     own = gui.add_checkbox("the gait's own speed and stride", True)
     speed = gui.add_slider(
         "speed [m/s]", min=0.2, max=1.6, step=0.05, initial_value=1.2, disabled=True
