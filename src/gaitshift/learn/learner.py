@@ -13,6 +13,7 @@ from tensordict import TensorDict
 
 from gaitshift.control.observation import JOINT_MIRROR
 from gaitshift.errors import GaitshiftError
+from gaitshift.learn.ppo import Mirror, WholeUpdatePPO
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.sim.env import GaitEnv
@@ -173,8 +174,10 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         cast(torch.nn.Linear, actor.mlp[-1]).weight.mul_(config.output_gain)
     critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
-    symmetric = config.mirror and env.machine.mirrored_states() is not None
-    ppo = PPO(
+    is_symmetric = config.mirror and env.machine.mirrored_states() is not None
+    mirror = _mirror(env) if is_symmetric else None
+    per_update = config.adapts == "update"
+    ppo = (WholeUpdatePPO if per_update else PPO)(
         actor,
         critic,
         storage,
@@ -188,29 +191,40 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         learning_rate=config.learning_rate,
         schedule="adaptive" if config.desired_kl > 0 else "fixed",
         desired_kl=config.desired_kl,
-        symmetry_cfg=_symmetry(env) if symmetric else None,
+        symmetry_cfg=_symmetry(mirror) if mirror and not per_update else None,
     )
+    if isinstance(ppo, WholeUpdatePPO):
+        ppo.mirror = mirror
     if config.fused_adam:
         weights = chain(actor.parameters(), critic.parameters())
         ppo.optimizer = torch.optim.Adam(weights, lr=config.learning_rate, fused=True)
     return ppo
 
 
-def _symmetry(env: GaitEnv) -> dict[str, Any]:
+def _mirror(env: GaitEnv) -> Mirror:
+    """What a mirror makes of the environment's observations and actions."""
+    order, signs = env.walker.observation.mirror
+    joint_order, joint_signs = JOINT_MIRROR
+    return Mirror(
+        order=torch.from_numpy(order),
+        signs=torch.from_numpy(signs),
+        joint_order=torch.tensor(joint_order),
+        joint_signs=torch.tensor(joint_signs, dtype=torch.float32),
+    )
+
+
+def _symmetry(mirror: Mirror) -> dict[str, Any]:
     """rsl_rl's augmentation: each batch followed by its mirror image."""
-    order, signs = (torch.from_numpy(part) for part in env.walker.observation.mirror)
-    joint_order = torch.tensor(JOINT_MIRROR[0])
-    joint_signs = torch.tensor(JOINT_MIRROR[1], dtype=torch.float32)
 
     def augment(
         env: Any, obs: TensorDict | None, actions: torch.Tensor | None
     ) -> tuple[TensorDict | None, torch.Tensor | None]:
         if obs is not None:
             seen = obs["policy"]
-            both = torch.cat([seen, signs * seen[:, order]])
+            both = torch.cat([seen, mirror.observation(seen)])
             obs = TensorDict({"policy": both}, batch_size=[len(both)])
         if actions is not None:
-            actions = torch.cat([actions, joint_signs * actions[:, joint_order]])
+            actions = torch.cat([actions, mirror.action(actions)])
         return obs, actions
 
     return {"env": None, "data_augmentation_func": augment, "use_data_augmentation": True}

@@ -1,6 +1,7 @@
 """The recipe: everything that decides what a training run does, as data."""
 
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 from gaitshift.data import check_ranges, known_names
 from gaitshift.errors import GaitshiftError
@@ -28,6 +29,9 @@ class PpoConfig:
     """Whether the value loss is clipped too; ours: no, since values are far larger than `clip`."""
     learning_rate: float = 1e-3
     """First learning rate; it follows `desired_kl` from there."""
+    adapts: Literal["update", "mini_batch"] = "update"
+    """When the learning rate follows `desired_kl`: after each update, which ends early where it
+    goes too far (`WholeUpdatePPO`); or at each mini-batch, as in rsl_rl."""
     desired_kl: float = 0.01
     """KL divergence an update aims at."""
     entropy: float = 0.003

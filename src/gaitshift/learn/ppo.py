@@ -1,0 +1,154 @@
+"""PPO whose learning rate follows the KL divergence of whole updates, on rsl_rl's networks."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, cast
+
+import torch
+from rsl_rl.algorithms import PPO
+from rsl_rl.modules import GaussianDistribution
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """Left and right changed, in observations and in actions."""
+
+    order: torch.Tensor
+    """For each part of the image of an observation the part of the observation itself."""
+    signs: torch.Tensor
+    """Factors of 1 or -1 on the parts of the image."""
+    joint_order: torch.Tensor
+    """As `order`, for actions."""
+    joint_signs: torch.Tensor
+    """As `signs`, for actions."""
+
+    def observation(self, seen: torch.Tensor) -> torch.Tensor:
+        """The images of observations (..., D)."""
+        return self.signs * seen[..., self.order]
+
+    def action(self, action: torch.Tensor) -> torch.Tensor:
+        """The images of actions (..., 12)."""
+        return self.joint_signs * action[..., self.joint_order]
+
+
+FAR = 2.0
+"""An update ends early once its KL divergence exceeds this multiple of the desired one; ours."""
+
+NEAR = 1.5
+"""The learning rate changes after an update whose KL divergence differs from the desired one by
+more than this factor; ours."""
+
+RATE_STEP = 1.5
+"""Factor by which the learning rate changes; that of rsl_rl."""
+
+RATES = (1e-5, 1e-2)
+"""Smallest and largest learning rate; those of rsl_rl."""
+
+
+class WholeUpdatePPO(PPO):
+    """rsl_rl's PPO with another update, and with the same checkpoints.
+
+    rsl_rl changes the learning rate at every mini-batch by the KL divergence since the update's
+    beginning. This divergence stays above the desired one for the rest of an update, so the rate
+    falls towards its least value, and most of an update's mini-batches change nothing. Here an
+    update has one rate, ends where it has gone too far, and changes the rate of the next one.
+    Observations are normalised and mirrored once, not at every mini-batch.
+    """
+
+    mirror: Mirror | None = None
+    """If given, each mini-batch is followed by its mirror image."""
+
+    def update(self) -> dict[str, float]:
+        """Learns from the storage and clears it; returns the mean value loss as `value`."""
+        samples = self._samples()
+        self._set_rate(self.learning_rate)
+        value_losses: list[float] = []
+        divergence = 0.0
+        for part in self._parts(len(samples["observation"])):
+            loss, value_loss, divergence = self._losses({k: v[part] for k, v in samples.items()})
+            if value_losses and self._is_adaptive and divergence > FAR * self._desired:
+                break
+            self.optimizer.zero_grad()
+            loss.backward()
+            for model in (self.actor, self.critic):
+                torch.nn.utils.clip_grad_norm_(model.parameters(), self.max_grad_norm)
+            self.optimizer.step()
+            value_losses.append(value_loss)
+        if self._is_adaptive:
+            self._set_rate(adapted(self.learning_rate, divergence / self._desired))
+        seen = cast(Any, self.storage).observations.flatten(0, 1)
+        self.actor.update_normalization(seen)
+        self.critic.update_normalization(seen)
+        self.storage.clear()
+        return {"value": sum(value_losses) / len(value_losses)}
+
+    @property
+    def _desired(self) -> float:
+        return float(self.desired_kl or 0.0)
+
+    @property
+    def _is_adaptive(self) -> bool:
+        return self._desired > 0 and self.schedule == "adaptive"
+
+    def _set_rate(self, rate: float) -> None:
+        """Sets the learning rate, also where a checkpoint keeps it."""
+        self.learning_rate = rate
+        for group in cast("list[dict[str, Any]]", self.optimizer.param_groups):
+            group["lr"] = rate
+
+    def _samples(self) -> dict[str, torch.Tensor]:
+        """All samples of the storage by name, one a row.
+
+        `observation`, normalised, and `action` are (n, 2, …): the sample and its mirror image; or
+        (n, 1, …) without a mirror.
+        """
+        store = cast(Any, self.storage)
+        observation = store.observations.flatten(0, 1)["policy"]
+        action = store.actions.flatten(0, 1)
+        mean, std = (part.flatten(0, 1) for part in store.distribution_params)
+        seen, done = [observation], [action]
+        if self.mirror is not None:
+            seen.append(self.mirror.observation(observation))
+            done.append(self.mirror.action(action))
+        return {
+            "observation": cast(Any, self.actor).obs_normalizer(torch.stack(seen, 1)),
+            "action": torch.stack(done, 1),
+            "advantage": store.advantages.flatten(),
+            "return": store.returns.flatten(),
+            "log_prob": store.actions_log_prob.flatten(),
+            "mean": mean,
+            "std": std,
+        }
+
+    def _parts(self, samples: int) -> Iterator[torch.Tensor]:
+        """The rows of each mini-batch."""
+        size = samples // self.num_mini_batches
+        for _ in range(self.num_learning_epochs):
+            yield from torch.randperm(samples).split(size)[: self.num_mini_batches]
+
+    def _losses(self, sample: dict[str, torch.Tensor]) -> tuple[torch.Tensor, float, float]:
+        """The loss of a mini-batch, its value loss, and the KL divergence since the beginning."""
+        distribution = cast(GaussianDistribution, self.actor.distribution)
+        distribution.update(self.actor.mlp(sample["observation"]))
+        log_prob = distribution.log_prob(sample["action"])
+        value = self.critic.mlp(sample["observation"]).squeeze(-1)
+        with torch.no_grad():
+            now = distribution.mean[:, 0], distribution.std[:, 0]
+            divergence = distribution.kl_divergence((sample["mean"], sample["std"]), now).mean()
+        ratio = torch.exp(log_prob - sample["log_prob"][:, None])
+        clipped = ratio.clamp(1.0 - self.clip_param, 1.0 + self.clip_param)
+        advantage = sample["advantage"][:, None]
+        surrogate = -torch.minimum(advantage * ratio, advantage * clipped).mean()
+        value_loss = (sample["return"][:, None] - value).pow(2).mean()
+        entropy = distribution.entropy.mean()
+        loss = surrogate + self.value_loss_coef * value_loss - self.entropy_coef * entropy
+        return loss, value_loss.item(), divergence.item()
+
+
+def adapted(rate: float, excess: float) -> float:
+    """The next learning rate after an update with this KL divergence over the desired one."""
+    if excess > NEAR:
+        rate /= RATE_STEP
+    elif excess < 1.0 / NEAR:
+        rate *= RATE_STEP
+    return min(max(rate, RATES[0]), RATES[1])
