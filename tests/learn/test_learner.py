@@ -9,6 +9,7 @@ from tensordict import TensorDict
 
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.learn.learner import Learner
+from gaitshift.learn.ppo import adapted
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
@@ -157,56 +158,98 @@ def test_a_cut_episode_is_worth_what_its_true_last_observation_is_worth():
 SEEN = ("machine_state", "contact", "base_linear_velocity_b", "yaw_rate_command", "joint_position")
 
 
-def learner_of(machine, *, mirror):
+def learner_of(machine, **ppo):
     config = EnvConfig(observed=SEEN)
     env = GaitEnv(machine, flat(20.0, 20.0), 2, config=config, threads=1)
-    ppo = PpoConfig(hidden=(8,), mirror=mirror)
-    return Learner(env, replace(TINY, env=config, ppo=ppo, robots=2, steps=4))
+    torch.manual_seed(0)
+    recipe = replace(TINY, env=config, ppo=PpoConfig(hidden=(8,), **ppo), robots=2, steps=4)
+    learner = Learner(env, recipe)
+    learner.start_episodes(0)
+    return learner
 
 
 @pytest.mark.parametrize(("gait", "states"), [("trot", [0.0, 1.0]), ("bound", [1.0, 0.0])])
-def test_each_batch_is_followed_by_its_mirror_image(gait, states):
-    symmetry = learner_of(gaits.load(gait), mirror=True).ppo.symmetry
-    assert symmetry.use_data_augmentation
+def test_a_mirror_image_is_what_would_be_seen_and_done_on_the_other_side(gait, states):
+    mirror = learner_of(gaits.load(gait)).ppo.mirror
     # In the first state, on FL and BL, drifting left and turning right, joints 1 … 12 tenths.
     joints = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2]
     mirrored_joints = [-0.4, 0.5, 0.6, -0.1, 0.2, 0.3, -1.0, 1.1, 1.2, -0.7, 0.8, 0.9]
     seen = torch.tensor([[1.0, 0, 1, 0, 1, 0, 1.2, 0.3, -0.1, -0.4, *joints], [0.0] * 22])
     image = torch.tensor([*states, 0, 1, 0, 1, 1.2, -0.3, -0.1, 0.4, *mirrored_joints])
-    obs, actions = symmetry.data_augmentation_func(
-        env=None,
-        obs=TensorDict({"policy": seen}, batch_size=[2]),
-        actions=torch.tensor([joints, [0.0] * 12]),
-    )
-    assert obs.batch_size == torch.Size([4])
-    torch.testing.assert_close(obs["policy"][:2], seen)
-    torch.testing.assert_close(obs["policy"][2], image)
-    torch.testing.assert_close(actions[0], torch.tensor(joints))
-    torch.testing.assert_close(actions[2], torch.tensor(mirrored_joints))
-    assert not obs["policy"][3].any()
-    assert actions.shape == (4, 12)
+    torch.testing.assert_close(mirror.observation(seen)[0], image)
+    assert not mirror.observation(seen)[1].any()
+    torch.testing.assert_close(mirror.action(torch.tensor(joints)), torch.tensor(mirrored_joints))
 
 
-def test_an_observation_and_its_mirror_image_are_drawn_to_the_same_return():
-    learner = learner_of(TROT, mirror=True)
+def weights_after(learner):
+    """Weights of both networks after one iteration."""
     learner.iterate()
-    augmented = []
-    augment = learner.ppo.symmetry.augment_batch
+    models = (learner.ppo.actor, learner.ppo.critic)
+    return torch.cat([one.detach().flatten() for model in models for one in model.parameters()])
 
-    def kept(batch, size):
-        augment(batch, size)
-        augmented.append((batch.returns.clone(), batch.observations["policy"].clone(), size))
 
-    learner.ppo.symmetry.augment_batch = kept
+@pytest.mark.parametrize("mirror", [True, False])
+def test_with_a_fixed_rate_an_update_is_that_of_rsl_rl(mirror):
+    """One mini-batch a pass leaves nothing to the order in which samples are drawn."""
+    settings = {"mini_batches": 1, "epochs": 3, "desired_kl": 0.0, "mirror": mirror}
+    ours = weights_after(learner_of(TROT, adapts="update", **settings))
+    theirs = weights_after(learner_of(TROT, adapts="mini_batch", **settings))
+    torch.testing.assert_close(ours, theirs, rtol=1e-4, atol=1e-6)
+    rate = weights_after(learner_of(TROT, adapts="update", learning_rate=9e-4, **settings))
+    assert (ours - rate).abs().max() > 1e-4, "a tenth of the rate would be noticed"
+
+
+def test_a_mirror_changes_what_is_learned():
+    settings = {"mini_batches": 1, "epochs": 3, "desired_kl": 0.0}
+    with_, without = (weights_after(learner_of(TROT, mirror=m, **settings)) for m in (True, False))
+    assert (with_ - without).abs().max() > 1e-4
+
+
+def steps_taken(learner):
+    """Steps of the optimiser in an iteration."""
+    taken = []
+    step = learner.ppo.optimizer.step
+    learner.ppo.optimizer.step = lambda: (taken.append(1), step())
     learner.iterate()
-    assert augmented
-    for returns, observations, size in augmented:
-        assert len(returns) == len(observations) == 2 * size
-        torch.testing.assert_close(returns[size:], returns[:size])
+    return len(taken)
+
+
+def test_an_update_that_goes_too_far_ends_and_the_next_one_is_slower():
+    settings = {"epochs": 10, "mini_batches": 2, "learning_rate": 1e-2}
+    bold = learner_of(TROT, desired_kl=1e-4, **settings)
+    assert steps_taken(bold) < 20
+    assert bold.ppo.learning_rate == pytest.approx(1e-2 / 1.5)
+    patient = learner_of(TROT, desired_kl=10.0, **{**settings, "learning_rate": 1e-4})
+    assert steps_taken(patient) == 20
+    assert patient.ppo.learning_rate == pytest.approx(1.5e-4)
+
+
+@pytest.mark.parametrize(
+    ("rate", "excess", "expected"),
+    [
+        (1e-3, 1.0, 1e-3),
+        (1e-3, 1.4, 1e-3),
+        (1e-3, 1.6, 1e-3 / 1.5),
+        (1e-3, 0.7, 1e-3),
+        (1e-3, 0.6, 1.5e-3),
+        (1.2e-5, 9.0, 1e-5),
+        (9e-3, 0.1, 1e-2),
+    ],
+)
+def test_the_rate_follows_the_divergence_within_bounds(rate, excess, expected):
+    assert adapted(rate, excess) == pytest.approx(expected)
+
+
+def test_a_checkpoint_keeps_the_rate():
+    one, other = (learner_of(TROT, learning_rate=1e-4) for _ in range(2))
+    one.iterate()
+    assert one.ppo.learning_rate != other.ppo.learning_rate
+    other.ppo.load(one.ppo.save(), None, True)
+    assert other.ppo.learning_rate == one.ppo.learning_rate
 
 
 def test_a_gait_with_a_leading_side_and_a_recipe_without_mirror_learn_from_what_was_seen_alone():
-    assert learner_of(TROT, mirror=False).ppo.symmetry is None
+    assert learner_of(TROT, mirror=False).ppo.mirror is None
     leading = {
         "name": "three-beat",
         "title": "Three beats",
@@ -226,4 +269,4 @@ def test_a_gait_with_a_leading_side_and_a_recipe_without_mirror_learn_from_what_
     }
     machine = RewardMachine.from_dict(leading)
     assert machine.mirrored_states() is None
-    assert learner_of(machine, mirror=True).ppo.symmetry is None
+    assert learner_of(machine, mirror=True).ppo.mirror is None

@@ -63,11 +63,13 @@ class WholeUpdatePPO(PPO):
         samples = self._samples()
         self._set_rate(self.learning_rate)
         value_losses: list[float] = []
-        divergence = 0.0
-        for part in self._parts(len(samples["observation"])):
-            loss, value_loss, divergence = self._losses({k: v[part] for k, v in samples.items()})
-            if value_losses and self._is_adaptive and divergence > FAR * self._desired:
+        part: dict[str, torch.Tensor] = {}
+        for rows in self._parts(len(samples["observation"])):
+            part = {name: values[rows] for name, values in samples.items()}
+            self._see(part)
+            if value_losses and self._is_adaptive and self._excess(part) > FAR:
                 break
+            loss, value_loss = self._losses(part)
             self.optimizer.zero_grad()
             loss.backward()
             for model in (self.actor, self.critic):
@@ -75,7 +77,9 @@ class WholeUpdatePPO(PPO):
             self.optimizer.step()
             value_losses.append(value_loss)
         if self._is_adaptive:
-            self._set_rate(adapted(self.learning_rate, divergence / self._desired))
+            with torch.no_grad():
+                self._see(part)
+            self._set_rate(adapted(self.learning_rate, self._excess(part)))
         seen = cast(Any, self.storage).observations.flatten(0, 1)
         self.actor.update_normalization(seen)
         self.critic.update_normalization(seen)
@@ -126,23 +130,34 @@ class WholeUpdatePPO(PPO):
         for _ in range(self.num_learning_epochs):
             yield from torch.randperm(samples).split(size)[: self.num_mini_batches]
 
-    def _losses(self, sample: dict[str, torch.Tensor]) -> tuple[torch.Tensor, float, float]:
-        """The loss of a mini-batch, its value loss, and the KL divergence since the beginning."""
-        distribution = cast(GaussianDistribution, self.actor.distribution)
-        distribution.update(self.actor.mlp(sample["observation"]))
-        log_prob = distribution.log_prob(sample["action"])
-        value = self.critic.mlp(sample["observation"]).squeeze(-1)
+    @property
+    def _distribution(self) -> GaussianDistribution:
+        """The distribution of actions at the observations that were seen last."""
+        return cast(GaussianDistribution, self.actor.distribution)
+
+    def _see(self, part: dict[str, torch.Tensor]) -> None:
+        """Shows the actor the observations of a mini-batch."""
+        self._distribution.update(self.actor.mlp(part["observation"]))
+
+    def _excess(self, part: dict[str, torch.Tensor]) -> float:
+        """KL divergence from the update's beginning over the desired one, at a seen mini-batch."""
         with torch.no_grad():
-            now = distribution.mean[:, 0], distribution.std[:, 0]
-            divergence = distribution.kl_divergence((sample["mean"], sample["std"]), now).mean()
-        ratio = torch.exp(log_prob - sample["log_prob"][:, None])
+            now = self._distribution.mean[:, 0], self._distribution.std[:, 0]
+            divergence = self._distribution.kl_divergence((part["mean"], part["std"]), now)
+        return divergence.mean().item() / self._desired
+
+    def _losses(self, part: dict[str, torch.Tensor]) -> tuple[torch.Tensor, float]:
+        """The loss of a seen mini-batch, and its value loss."""
+        value = self.critic.mlp(part["observation"]).squeeze(-1)
+        log_prob = self._distribution.log_prob(part["action"])
+        ratio = torch.exp(log_prob - part["log_prob"][:, None])
         clipped = ratio.clamp(1.0 - self.clip_param, 1.0 + self.clip_param)
-        advantage = sample["advantage"][:, None]
+        advantage = part["advantage"][:, None]
         surrogate = -torch.minimum(advantage * ratio, advantage * clipped).mean()
-        value_loss = (sample["return"][:, None] - value).pow(2).mean()
-        entropy = distribution.entropy.mean()
+        value_loss = (part["return"][:, None] - value).pow(2).mean()
+        entropy = self._distribution.entropy.mean()
         loss = surrogate + self.value_loss_coef * value_loss - self.entropy_coef * entropy
-        return loss, value_loss.item(), divergence.item()
+        return loss, value_loss.item()
 
 
 def adapted(rate: float, excess: float) -> float:

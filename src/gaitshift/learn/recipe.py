@@ -175,6 +175,21 @@ _ROUGH = Stage(
     trace_factor=2.5,
 )
 
+_POLISH = replace(
+    _ROUGH,
+    name="polish",
+    iterations=300,
+    trace_factor=1.0,
+    fields=_shared_out(flat=5, perlin=2, slope=1, stair=2, step=2),
+    settle=1.0,
+    averaged=0.5,
+)
+
+_EXACT_STAGES = (Stage(name="flat", iterations=450), _ROUGH, _POLISH)
+
+_EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
+"""PPO as in rsl_rl."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
@@ -184,19 +199,7 @@ class Recipe:
     """The environment."""
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """The algorithm."""
-    stages: tuple[Stage, ...] = (
-        Stage(name="flat", iterations=450),
-        _ROUGH,
-        replace(
-            _ROUGH,
-            name="polish",
-            iterations=300,
-            trace_factor=1.0,
-            fields=_shared_out(flat=5, perlin=2, slope=1, stair=2, step=2),
-            settle=1.0,
-            averaged=0.5,
-        ),
-    )
+    stages: tuple[Stage, ...] = _EXACT_STAGES
     """Flat ground, then Perlin ground with pushes (paper III-D) in two stages: the first makes the
     policy robust, the second makes the gait clean again."""
     robots: int = 128
@@ -298,15 +301,20 @@ class Recipe:
         return last.averaged > 0 and iteration >= self.iterations - last.averaged * last.iterations
 
     @classmethod
+    def three_stage(cls) -> "Recipe":
+        """The recipe by which the shipped trot and bound are trained: exact physics throughout."""
+        return cls(ppo=_EACH_MINI_BATCH, stages=_EXACT_STAGES)
+
+    @classmethod
     def two_stage(cls) -> "Recipe":
-        """The recipe without the last stage, by which six of the shipped policies are trained.
+        """`three_stage` without the last stage, by which the other shipped policies are trained.
 
         The last 35 % of all iterations settle, and actors are averaged over the last 24 %.
         """
         rough, total = replace(_ROUGH, trace_factor=1.0), 350 + _ROUGH.iterations
         settle, averaged = (share * total / _ROUGH.iterations for share in (0.35, 0.24))
         last = replace(rough, settle=settle, averaged=averaged)
-        return cls(stages=(Stage(name="flat", iterations=350), last))
+        return cls(ppo=_EACH_MINI_BATCH, stages=(Stage(name="flat", iterations=350), last))
 
     @classmethod
     def paper(cls) -> "Recipe":
@@ -325,6 +333,7 @@ class Recipe:
                 epochs=10,
                 mini_batches=47,
                 learning_rate=3e-4,
+                adapts="mini_batch",
                 desired_kl=0.0,
                 entropy=0.0,
                 initial_std=1.0,
@@ -345,5 +354,10 @@ def _grown(iteration: int, start: float, end: float) -> float:
     return min(max((iteration - start) / (end - start), 0.0), 1.0)
 
 
-PRESETS = {"default": Recipe, "two-stage": Recipe.two_stage, "paper": Recipe.paper}
+PRESETS = {
+    "default": Recipe,
+    "three-stage": Recipe.three_stage,
+    "two-stage": Recipe.two_stage,
+    "paper": Recipe.paper,
+}
 """Recipes by the name that `gaitshift train --preset` takes."""
