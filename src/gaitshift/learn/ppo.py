@@ -69,7 +69,8 @@ class WholeUpdatePPO(PPO):
             self._see(part)
             if value_losses and self._is_adaptive and self._excess(part) > FAR:
                 break
-            loss, value_loss = self._losses(part)
+            turn = len(value_losses) % part["observation"].shape[1]
+            loss, value_loss = self._losses(part, turn)
             self.optimizer.zero_grad()
             loss.backward()
             for model in (self.actor, self.critic):
@@ -146,15 +147,19 @@ class WholeUpdatePPO(PPO):
             divergence = self._distribution.kl_divergence((part["mean"], part["std"]), now)
         return divergence.mean().item() / self._desired
 
-    def _losses(self, part: dict[str, torch.Tensor]) -> tuple[torch.Tensor, float]:
-        """The loss of a seen mini-batch, and its value loss."""
-        value = self.critic.mlp(part["observation"]).squeeze(-1)
+    def _losses(self, part: dict[str, torch.Tensor], turn: int) -> tuple[torch.Tensor, float]:
+        """The loss of a seen mini-batch, and its value loss.
+
+        The actor learns from samples and their images. The critic, of which less depends, learns
+        from either in turn, which takes a quarter less time.
+        """
+        value = self.critic.mlp(part["observation"][:, turn]).squeeze(-1)
         log_prob = self._distribution.log_prob(part["action"])
         ratio = torch.exp(log_prob - part["log_prob"][:, None])
         clipped = ratio.clamp(1.0 - self.clip_param, 1.0 + self.clip_param)
         advantage = part["advantage"][:, None]
         surrogate = -torch.minimum(advantage * ratio, advantage * clipped).mean()
-        value_loss = (part["return"][:, None] - value).pow(2).mean()
+        value_loss = (part["return"] - value).pow(2).mean()
         entropy = self._distribution.entropy.mean()
         loss = surrogate + self.value_loss_coef * value_loss - self.entropy_coef * entropy
         return loss, value_loss.item()
