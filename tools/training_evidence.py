@@ -44,7 +44,7 @@ SEEDS_HEAD = """# Is the flat stage clean from fresh seeds?
 
 With {seeds} fresh seeds per gait, these policies are clean: {clean}.
 
-Each policy is trained by the flat stage of the default recipe alone ({iterations} iterations,
+Each policy is trained by the flat stage of the recipe `three-stage` alone ({iterations} iterations,
 {steps:.1f} million control steps, about six minutes on one core), for seeds 1 to {seeds}.
 It is judged on flat ground, with 64 robots for 12 s, by the limits of `gaitshift evaluate`. The
 speed loop of `evaluate` is on; the column *open loop* gives the mean speed without it.
@@ -55,8 +55,8 @@ ADDITIONS_HEAD = """# What does each addition to Table I contribute?
 When one addition is left out, the trot is never clean without {never}; clean on some seeds only
 without {some}; and always clean without {always}.
 
-A trot is trained by the first {iterations} iterations of the default recipe, on flat ground: once
-with all additions, and once without each of the seven terms that the reward adds to the paper's
+A trot is trained by the first {iterations} iterations of the recipe `three-stage`, on flat ground:
+once with all additions, and once without each of the seven terms that the reward adds to the paper's
 Table I and each of the two factors of the bonus (`gaitshift.sim.reward.ADDITIONS`,
 `BONUS_SHARES`). The numbers are means over seeds 1 to {seeds}. Each policy is judged on flat
 ground, with 64 robots for 12 s. *Clean* counts the policies that keep all limits of `gaitshift
@@ -74,8 +74,8 @@ On noise of 0.10 m {mixed} shifts into a bound fail after training with mixed st
 without.
 
 The paper exchanges gaits in an instant and does not train for it. Here a bound is trained by the
-default recipe, and by the same recipe with mixed starts: on the rough stage the share {share:g}
-of the episodes begins with the legs of different robots (`Stage.mixed_starts`), as after a shift.
+recipe `three-stage`, and by the same recipe with mixed starts: on the rough stage the share
+{share:g} of the episodes begins with the legs of different robots (`Stage.mixed_starts`), as after a shift.
 Then {switches} robots shift into this bound at random phases of a trot, and as many from a pace,
 on noise of 0.10 m, as in `gaitshift transitions`. Touchdowns (of the foot that is furthest from
 one per cycle) and cost of transport are those of 64 robots for 12 s on flat ground. The last
@@ -86,7 +86,7 @@ This page is made by `python tools/training_evidence.py shifts --seeds {seeds}`.
 
 @dataclass(frozen=True, kw_only=True)
 class Default(Setting):
-    """The default recipe, or one like it, with the machines as they are."""
+    """The recipe `three-stage`, or one like it, with the machines as they are."""
 
     def machine(self, gait: str) -> RewardMachine:
         """The gait's own."""
@@ -95,7 +95,8 @@ class Default(Setting):
 
 def setting(iterations: int, without: str | None = None, name: str = "default") -> Default:
     """The first iterations of the recipe on one core, without one of the additions."""
-    recipe = Recipe(threads=1, physics_threads=1).with_iterations(iterations)
+    recipe = replace(Recipe.three_stage(), threads=1, physics_threads=1)
+    recipe = recipe.with_iterations(iterations)
     if without is not None:
         reward = replace(recipe.env.reward, **{without: 0.0})
         recipe = replace(recipe, env=replace(recipe.env, reward=reward))
@@ -125,7 +126,7 @@ def judged(
 
 def write_seeds(processes: int, seeds: int) -> Path:
     """The table of fresh seeds, from 1 on."""
-    flat = Recipe().stages[0].iterations
+    flat = Recipe.three_stage().stages[0].iterations
     jobs = jobs_of([setting(flat)], FIRST_GAITS, range(1, seeds + 1))
     figures = judged(jobs, processes)
     unaided = judged(jobs, processes, replace(JUDGED, open_loop=True))
@@ -158,7 +159,7 @@ def write_seeds(processes: int, seeds: int) -> Path:
         f" of {seeds}"
         for gait in FIRST_GAITS
     ]
-    steps = flat * Recipe().robots * Recipe().steps / 1e6
+    steps = flat * Recipe.three_stage().robots * Recipe.three_stage().steps / 1e6
     text = SEEDS_HEAD.format(clean=", ".join(clean), iterations=flat, steps=steps, seeds=seeds)
     return _write("seeds.md", text, head, rows)
 

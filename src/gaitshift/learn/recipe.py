@@ -15,8 +15,8 @@ class PpoConfig:
 
     hidden: tuple[int, ...] = (256, 128, 32)
     """Hidden layers of actor and critic, each followed by a leaky ReLU (paper IV-A)."""
-    epochs: int = 5
-    """Passes over each batch; rsl_rl's default."""
+    epochs: int = 3
+    """Passes over each batch; rsl_rl's default is 5."""
     mini_batches: int = 4
     """Mini-batches a pass; rsl_rl's default."""
     discount: float = 0.99
@@ -32,7 +32,7 @@ class PpoConfig:
     adapts: Literal["update", "mini_batch"] = "update"
     """When the learning rate follows `desired_kl`: after each update, which ends early where it
     goes too far (`WholeUpdatePPO`); or at each mini-batch, as in rsl_rl."""
-    desired_kl: float = 0.01
+    desired_kl: float = 0.03
     """KL divergence an update aims at."""
     entropy: float = 0.003
     """Weight of the entropy bonus; ours."""
@@ -187,6 +187,13 @@ _POLISH = replace(
 
 _EXACT_STAGES = (Stage(name="flat", iterations=450), _ROUGH, _POLISH)
 
+_STAGES = (
+    Stage(name="flat", iterations=300, fidelity="coarse"),
+    replace(_ROUGH, iterations=500, fidelity="coarse", kl_factor=1.5),
+    replace(_POLISH, iterations=120, fidelity="coarse", kl_factor=1.0, settle=0.0, averaged=0.0),
+    replace(_POLISH, name="finish", iterations=150, kl_factor=1.0),
+)
+
 _EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
 """PPO as in rsl_rl."""
 
@@ -199,7 +206,7 @@ class Recipe:
     """The environment."""
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """The algorithm."""
-    stages: tuple[Stage, ...] = _EXACT_STAGES
+    stages: tuple[Stage, ...] = _STAGES
     """Flat ground, then Perlin ground with pushes (paper III-D) in two stages: the first makes the
     policy robust, the second makes the gait clean again."""
     robots: int = 128

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mujoco.batch import Batch
@@ -15,6 +16,10 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.shift import Rule
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import from_spec
+
+if TYPE_CHECKING:
+    from gaitshift.learn.learner import Learner
+    from gaitshift.learn.recipe import Recipe
 
 ROUNDS = 7
 """Rounds in which both are measured alternately; the results are medians over them."""
@@ -107,28 +112,38 @@ def _doubled(most: int) -> list[int]:
 def training_speed(seed: int) -> dict[str, float]:
     """Control steps per second of training over all robots [1/s], and the time of the flat stage.
 
+    `iteration_over_three_stage` is the time of an iteration over that of the preset `three-stage`,
+    in exact physics and with updates as in rsl_rl, measured in turns.
+
     Raises:
         ImportError: torch or rsl_rl is not installed.
     """
-    import torch
-
-    from gaitshift.learn.learner import Learner
     from gaitshift.learn.recipe import Recipe
 
-    recipe = Recipe()
-    torch.set_num_threads(recipe.threads)
-    ground = from_spec("flat", seed=0, length=20.0, width=20.0)
-    env = GaitEnv(gaits.load("trot"), ground, recipe.robots, config=recipe.env)
-    learner = Learner(env, recipe)
-    learner.start_episodes(seed)
-    learner.iterate()
-    per_iteration = median([seconds_of(learner.iterate) for _ in range(ROUNDS)])
+    recipe, before = Recipe(), Recipe.three_stage()
+    learners = [_learner(one, seed) for one in (recipe, before)]
+    seconds = [[seconds_of(learner.iterate) for learner in learners] for _ in range(ROUNDS)]
+    per_iteration = median([now for now, _ in seconds])
     flat = recipe.stages[0].iterations
     return {
         "training_steps_per_s": recipe.robots * recipe.steps / per_iteration,
+        "iteration_over_three_stage": median([now / then for now, then in seconds]),
         "flat_stage_iterations": float(flat),
         "flat_stage_minutes": flat * per_iteration / 60,
     }
+
+
+def _learner(recipe: "Recipe", seed: int) -> "Learner":
+    """A learner in the first stage of a recipe, after one iteration."""
+    from gaitshift.learn.learner import Learner
+
+    ground = from_spec("flat", seed=0, length=20.0, width=20.0)
+    env = GaitEnv(gaits.load("trot"), ground, recipe.robots, config=recipe.env)
+    env.set_terrain((ground,), recipe.stages[0].fidelity)
+    learner = Learner(env, recipe)
+    learner.start_episodes(seed)
+    learner.iterate()
+    return learner
 
 
 class _Bare:
