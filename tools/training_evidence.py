@@ -56,8 +56,8 @@ When one addition is left out, the trot is never clean without {never}; clean on
 without {some}; and always clean without {always}.
 
 A trot is trained by the first {iterations} iterations of the recipe `three-stage`, on flat ground:
-once with all additions, and once without each of the seven terms that the reward adds to the paper's
-Table I and each of the two factors of the bonus (`gaitshift.sim.reward.ADDITIONS`,
+once with all additions, and once without each of the seven terms that the reward adds to the
+paper's Table I and each of the two factors of the bonus (`gaitshift.sim.reward.ADDITIONS`,
 `BONUS_SHARES`). The numbers are means over seeds 1 to {seeds}. Each policy is judged on flat
 ground, with 64 robots for 12 s. *Clean* counts the policies that keep all limits of `gaitshift
 evaluate`. *Worst touchdowns* are those of the foot that is furthest from one touchdown per cycle.
@@ -75,11 +75,11 @@ without.
 
 The paper exchanges gaits in an instant and does not train for it. Here a bound is trained by the
 recipe `three-stage`, and by the same recipe with mixed starts: on the rough stage the share
-{share:g} of the episodes begins with the legs of different robots (`Stage.mixed_starts`), as after a shift.
-Then {switches} robots shift into this bound at random phases of a trot, and as many from a pace,
-on noise of 0.10 m, as in `gaitshift transitions`. Touchdowns (of the foot that is furthest from
-one per cycle) and cost of transport are those of 64 robots for 12 s on flat ground. The last
-three columns are the survival of 64 robots for 20 s on rough ground.
+{share:g} of the episodes begins with the legs of different robots (`Stage.mixed_starts`), as
+after a shift. Then {switches} robots shift into this bound at random phases of a trot, and as
+many from a pace, on noise of 0.10 m, as in `gaitshift transitions`. Touchdowns (of the foot that
+is furthest from one per cycle) and cost of transport are those of 64 robots for 12 s on flat
+ground. The last three columns are the survival of 64 robots for 20 s on rough ground.
 This page is made by `python tools/training_evidence.py shifts --seeds {seeds}`.
 """
 
