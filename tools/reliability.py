@@ -483,7 +483,9 @@ def write_page(rows: list[table.Row]) -> None:
         f"fault{'' if faults == 1 else 's'}."
     )
     text = HEAD.format(answer=answer, limit=SHARE_OF_TIME)
-    (RESULTS / "reliability.md").write_text(text + table.markdown(rows) + "\n", encoding="utf-8")
+    cells = [tuple(str(one[name]) for name in COLUMNS) for one in rows]
+    text += table.markdown(COLUMNS, cells) + "\n"
+    (RESULTS / "reliability.md").write_text(text, encoding="utf-8")
 
 
 def run(command: list[str]) -> None:

@@ -1,0 +1,306 @@
+"""Measures speed and memory, and writes docs/results/speed.md.
+
+Usage: python tools/speed_evidence.py [--before CHECKOUT]
+
+All figures are ratios from one run, or medians; nothing else should run on the machine. With the
+checkout of an earlier version, an iteration of training is also compared with that version's.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from itertools import pairwise
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from gaitshift import table
+from gaitshift.lab.benchmark.peers import OURS
+from gaitshift.learn.progress import read
+
+RESULTS = Path(__file__).parent.parent / "docs" / "results"
+GAITSHIFT = (sys.executable, "-m", "gaitshift")
+TURNS = 3
+"""Turns in which two versions, or two commands, are measured alternately."""
+TRAINED = (128, 1024, 2048)
+"""Numbers of robots whose training memory is measured."""
+LARGE = 1.4e9
+"""Size of the table that `identify` reads [bytes]."""
+
+PAGE = """# How fast is it?
+
+{answer}
+
+All figures come from one run of `python tools/speed_evidence.py` on {cores} cores.
+
+## The environment beside bare physics
+
+Bare physics is MuJoCo's own batch with the same model and the same joint targets (`gaitshift bench
+speed --speed.robots N --speed.terrain GROUND`, seven turns, medians).
+
+{environment}
+
+## Growth
+
+The same on flat ground with more robots and more threads (`gaitshift bench growth`).
+
+{growth}
+
+## Beside other vector environments
+
+The same robot, the same targets, in turns (`gaitshift bench peers --speed.robots 32`). `mujoco.rollout`
+computes the motion alone: no observation, no reward, no reset. MJX is left out: it needs the package
+`mujoco`, which writes into the folder of `mujoco-core`, on which this project depends.
+
+{peers}
+
+## Training
+
+{training}
+
+## Memory
+
+{memory}
+
+## The start
+
+{start}
+"""
+
+
+def as_text(rows: list[table.Row]) -> str:
+    """Rows as a Markdown table."""
+    return table.markdown(tuple(rows[0]), [tuple(map(str, row.values())) for row in rows])
+
+
+def bench(what: str, *options: str) -> Any:
+    """What `gaitshift bench` measures."""
+    words = [*GAITSHIFT, "bench", what, *options, "--json"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    return json.loads(done.stdout)
+
+
+def environment() -> list[table.Row]:
+    """The environment over bare physics, on flat ground and on height fields."""
+    rows: list[table.Row] = []
+    for ground in ("flat", "perlin:0.10", "stairs:0.05"):
+        found = bench("speed", "--speed.terrain", ground)
+        rows.append({"ground": ground, "robots": 128, "env over bare": f"{_ratio(found):.2f}"})
+    return rows
+
+
+def _ratio(found: dict[str, float]) -> float:
+    return found["env_over_bare"]
+
+
+def grown() -> list[table.Row]:
+    """Steps per second with more robots and threads, over those of 128 robots."""
+    found = bench("growth")
+    usual = found["128 robots"]["env_steps_per_s"]
+    return [
+        {
+            "case": case,
+            "steps/s over 128 robots": f"{figures['env_steps_per_s'] / usual:.2f}",
+            "env over bare": f"{_ratio(figures):.2f}",
+        }
+        for case, figures in found.items()
+    ]
+
+
+def beside() -> list[table.Row]:
+    """The environment over each of its peers."""
+    found = bench("peers", "--speed.robots", "32")
+    ours = found[OURS]
+    return [
+        {"peer": name, "gaitshift over it": f"{ours / rate:.2f}"}
+        for name, rate in found.items()
+        if name != OURS
+    ]
+
+
+def iteration_ms(source: Path | None) -> float:
+    """Median time of an iteration of the default recipe [ms], by this or another checkout."""
+    environment = dict(os.environ)
+    if source is not None:
+        environment["PYTHONPATH"] = str(source / "src")
+    with tempfile.TemporaryDirectory() as place:
+        words = ["train", "trot", "--iterations", "40", "--out", f"{place}/run"]
+        subprocess.run(
+            [*GAITSHIFT, *words], env=environment, capture_output=True, text=True, check=True
+        )
+        wall = [float(row["wall_s"]) for row in read(Path(place) / "run" / "progress.csv")]
+    return 1e3 * median(b - a for a, b in pairwise(wall))
+
+
+def watched() -> float:
+    """Time of 60 iterations with `--watch` over that without it, the median of the turns."""
+    return median(_seconds(True) / _seconds(False) for _ in range(TURNS))
+
+
+def _seconds(is_watched: bool) -> float:
+    with tempfile.TemporaryDirectory() as place:
+        words = ["train", "trot", "--iterations", "60", "--out", f"{place}/run"]
+        watch = ["--watch", "--port", "8123"] if is_watched else []
+        process = subprocess.Popen(
+            [*GAITSHIFT, *words, *watch], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        process.wait()
+        return float(read(Path(place) / "run" / "progress.csv")[-1]["wall_s"])
+
+
+def training(before: Path | None) -> list[table.Row]:
+    """An iteration over that of other recipes and versions."""
+    found = bench("speed")
+    rows: list[table.Row] = [
+        {
+            "what": "an iteration over one of the preset `three-stage`",
+            "ratio": f"{found['iteration_over_three_stage']:.2f}",
+        }
+    ]
+    if before is not None:
+        turns = [(iteration_ms(None), iteration_ms(before)) for _ in range(TURNS)]
+        ratio = median(now / then for now, then in turns)
+        version = subprocess.run(
+            ["git", "-C", str(before), "rev-parse", "--short", "HEAD"],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.strip()
+        rows.append(
+            {"what": f"an iteration over one of version {version}", "ratio": f"{ratio:.2f}"}
+        )
+    rows.append(
+        {"what": "training with `--watch` over training without", "ratio": f"{watched():.2f}"}
+    )
+    return rows
+
+
+def memory() -> list[table.Row]:
+    """Peak memory of trainings and of `identify` on a large table."""
+    rows: list[table.Row] = []
+    for robots in TRAINED:
+        with tempfile.TemporaryDirectory() as place:
+            words = ["train", "trot", "--robots", str(robots), "--iterations", "2"]
+            peak, _ = _measured([*words, "--out", f"{place}/run"])
+        rows.append(
+            {"what": f"training with {robots} robots", "peak": f"{peak:.2f} GB", "rate": ""}
+        )
+    with tempfile.TemporaryDirectory() as place:
+        path = Path(place) / "walk.csv"
+        write_walk(path)
+        size = path.stat().st_size
+        words = ["identify", str(path), "--condition", "height_difference", "--way", "rough"]
+        peak, seconds = _measured([*words, "--out", f"{place}/report"])
+    rate = f"{size / seconds / 1e6:.0f} MB/s"
+    rows.append(
+        {
+            "what": f"`identify` on {size / 1e9:.1f} GB of CSV",
+            "peak": f"{peak:.2f} GB",
+            "rate": rate,
+        }
+    )
+    return rows
+
+
+def write_walk(path: Path) -> None:
+    """A table of steps of a robot that repeats itself over flat and rough ground."""
+    import numpy as np
+
+    legs = ("FL", "FR", "BL", "BR")
+    names = ["time", "rough", "gravity_x", "gravity_y", "gravity_z"]
+    names += [f"contact_{leg}" for leg in legs]
+    names += [f"foot_{leg}_{axis}" for leg in legs for axis in "xyz"]
+    rng, step = np.random.default_rng(0), 0
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(names) + "\n")
+        while file.tell() < LARGE:
+            count = 100_000
+            number = np.arange(step, step + count)
+            rough = (number // 2000) % 2
+            down = ((number[:, None] // 20) % 2 == np.array([0, 1, 1, 0])).astype(int)
+            height = -0.5 + rough[:, None] * rng.normal(scale=0.05, size=(count, 4))
+            lines = (
+                f"{0.01 * (n + 1):.2f},{r},0.0,0.0,-1.0,"
+                + ",".join(map(str, d))
+                + ","
+                + ",".join(f"0.350000,0.200000,{z:.6f}" for z in h)
+                for n, r, d, h in zip(number, rough, down.tolist(), height.tolist(), strict=True)
+            )
+            file.write("\n".join(lines) + "\n")
+            step += count
+
+
+def _measured(words: list[str]) -> tuple[float, float]:
+    """Peak memory [GB] and time [s] of a command."""
+    code = (
+        "import resource, subprocess, sys; subprocess.run(sys.argv[1:], check=True, "
+        "stdout=subprocess.DEVNULL); print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)"
+    )
+    start = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, "-c", code, *GAITSHIFT, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode:
+        raise SystemExit(f"{' '.join(words)} failed:\n{done.stderr}")
+    return int(done.stdout.split()[-1]) / 1e6, time.monotonic() - start
+
+
+def start() -> list[table.Row]:
+    """Time to the first output of commands, medians of seven."""
+    rows: list[table.Row] = []
+    for words in (("gaits",), ("--help",)):
+        seconds: list[float] = []
+        for _ in range(7):
+            begin = time.perf_counter()
+            subprocess.run([*GAITSHIFT, *words], stdout=subprocess.DEVNULL, check=True)
+            seconds.append(time.perf_counter() - begin)
+        rows.append({"what": f"`gaitshift {words[0]}`", "seconds": f"{median(seconds):.2f}"})
+    runtime = [
+        subprocess.run(
+            [sys.executable, "examples/runtime.py"], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        for _ in range(3)
+    ]
+    rows.append({"what": "`python examples/runtime.py`", "seconds": sorted(runtime)[1]})
+    return rows
+
+
+def main() -> None:
+    """Measures everything, and writes the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--before", type=Path)
+    asked = parser.parse_args()
+    parts: dict[str, list[table.Row]] = {}
+    for name, measure in (
+        ("environment", environment),
+        ("growth", grown),
+        ("peers", beside),
+        ("training", lambda: training(asked.before)),
+        ("memory", memory),
+        ("start", start),
+    ):
+        parts[name] = measure()
+        print(as_text(parts[name]), flush=True)
+    flat = parts["environment"][0]["env over bare"]
+    answer = (
+        f"`env.step` runs at {flat} of the speed of bare physics (128 robots, flat ground), and "
+        f"an iteration of training takes {parts['training'][-2]['ratio']} of the time of "
+        f"{parts['training'][-2]['what'].split(' over ')[1].replace('one', 'an iteration', 1)}."
+    )
+    text = PAGE.format(
+        answer=answer,
+        cores=os.cpu_count(),
+        **{name: as_text(rows) for name, rows in parts.items()},
+    )
+    (RESULTS / "speed.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
