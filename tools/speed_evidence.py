@@ -52,9 +52,10 @@ The same on flat ground with more robots and more threads (`gaitshift bench grow
 
 ## Beside other vector environments
 
-The same robot, the same targets, in turns (`gaitshift bench peers --speed.robots 32`). `mujoco.rollout`
-computes the motion alone: no observation, no reward, no reset. MJX is left out: it needs the package
-`mujoco`, which writes into the folder of `mujoco-core`, on which this project depends.
+The same robot, the same targets, in turns (`gaitshift bench peers --speed.robots 32`).
+`mujoco.rollout` computes the motion alone: no observation, no reward, no reset. MJX is left out: it
+needs the package `mujoco`, which writes into the folder of `mujoco-core`, on which this project
+depends.
 
 {peers}
 
