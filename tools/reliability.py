@@ -122,6 +122,7 @@ def _kill_until_through(
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
+            encoding="utf-8",
             start_new_session=True,
         )
         try:
@@ -207,11 +208,19 @@ def _fails_badly(call: str, error: str, number: int, folder: Path) -> bool:
     inject = ["-e", f"inject={call}:error={error}:when={number}"]
     trace = ["strace", "-f", "-qq", "-e", f"trace={call}", *inject, "-o", "/dev/null"]
     first = subprocess.run(
-        [*trace, *_command(work, folder, Path())], capture_output=True, text=True, check=False
+        [*trace, *_command(work, folder, Path())],
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
     )
     again = [*GAITSHIFT, *work.words, "--out", str(folder), "--overwrite"]
     second = subprocess.run(
-        _command(work, folder, Path()), capture_output=True, text=True, check=False
+        _command(work, folder, Path()),
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        check=False,
     )
     said = first.stderr + second.stderr
     is_bad = TRACEBACK in said or second.returncode != 0
@@ -417,7 +426,7 @@ def page(tries: int, seed: int) -> Iterator[table.Row]:
 
     port = 8099
     command = [*GAITSHIFT, "view", "--port", str(port), "--seed", str(seed)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, encoding="utf-8")
     assert process.stdout is not None
     assert any("open http" in line for line in iter(process.stdout.readline, ""))
     try:
@@ -490,7 +499,7 @@ def write_page(rows: list[table.Row]) -> None:
 
 def run(command: list[str]) -> None:
     """Runs a command that must succeed."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=False)
     if done.returncode:
         raise SystemExit(f"{' '.join(command)} failed:\n{done.stderr}")
 

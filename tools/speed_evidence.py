@@ -40,7 +40,7 @@ All figures come from one run of `python tools/speed_evidence.py` on {cores} cor
 ## The environment beside bare physics
 
 Bare physics is MuJoCo's own batch with the same model and the same joint targets (`gaitshift bench
-speed --speed.robots N --speed.terrain GROUND`, seven turns, medians).
+speed --robots N --terrain GROUND`, seven turns, medians).
 
 {environment}
 
@@ -52,7 +52,7 @@ The same on flat ground with more robots and more threads (`gaitshift bench grow
 
 ## Beside other vector environments
 
-The same robot, the same targets, in turns (`gaitshift bench peers --speed.robots 32`).
+The same robot, the same targets, in turns (`gaitshift bench peers --robots 32`).
 `mujoco.rollout` computes the motion alone: no observation, no reward, no reset. MJX is left out: it
 needs the package `mujoco`, which writes into the folder of `mujoco-core`, on which this project
 depends.
@@ -81,7 +81,7 @@ def as_text(rows: list[table.Row]) -> str:
 def bench(what: str, *options: str) -> Any:
     """What `gaitshift bench` measures."""
     words = [*GAITSHIFT, "bench", what, *options, "--json"]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    done = subprocess.run(words, capture_output=True, text=True, encoding="utf-8", check=True)
     return json.loads(done.stdout)
 
 
@@ -89,7 +89,7 @@ def environment() -> list[table.Row]:
     """The environment over bare physics, on flat ground and on height fields."""
     rows: list[table.Row] = []
     for ground in ("flat", "perlin:0.10", "stairs:0.05"):
-        found = bench("speed", "--speed.terrain", ground)
+        found = bench("speed", "--terrain", ground)
         rows.append({"ground": ground, "robots": 128, "env over bare": f"{_ratio(found):.2f}"})
     return rows
 
@@ -114,7 +114,7 @@ def grown() -> list[table.Row]:
 
 def beside() -> list[table.Row]:
     """The environment over each of its peers."""
-    found = bench("peers", "--speed.robots", "32")
+    found = bench("peers", "--robots", "32")
     ours = found[OURS]
     return [
         {"peer": name, "gaitshift over it": f"{ours / rate:.2f}"}
@@ -131,7 +131,12 @@ def iteration_ms(source: Path | None) -> float:
     with tempfile.TemporaryDirectory() as place:
         words = ["train", "trot", "--iterations", "40", "--out", f"{place}/run"]
         subprocess.run(
-            [*GAITSHIFT, *words], env=environment, capture_output=True, text=True, check=True
+            [*GAITSHIFT, *words],
+            env=environment,
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            check=True,
         )
         wall = [float(row["wall_s"]) for row in read(Path(place) / "run" / "progress.csv")]
     return 1e3 * median(b - a for a, b in pairwise(wall))
@@ -169,6 +174,7 @@ def training(before: Path | None) -> list[table.Row]:
             ["git", "-C", str(before), "rev-parse", "--short", "HEAD"],
             capture_output=True,
             text=True,
+            encoding="utf-8",
             check=True,
         ).stdout.strip()
         rows.append(
@@ -246,6 +252,7 @@ def _measured(words: list[str]) -> tuple[float, float]:
         [sys.executable, "-c", code, *GAITSHIFT, *words],
         capture_output=True,
         text=True,
+        encoding="utf-8",
         check=False,
     )
     if done.returncode:
@@ -265,7 +272,11 @@ def start() -> list[table.Row]:
         rows.append({"what": f"`gaitshift {words[0]}`", "seconds": f"{median(seconds):.2f}"})
     runtime = [
         subprocess.run(
-            [sys.executable, "examples/runtime.py"], capture_output=True, text=True, check=True
+            [sys.executable, "examples/runtime.py"],
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            check=True,
         ).stdout.strip()
         for _ in range(3)
     ]

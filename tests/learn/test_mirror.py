@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from gaitshift.gait import gaits
-from gaitshift.learn.learner import Learner, as_tensors
+from gaitshift.learn.learner import Learner
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
@@ -150,15 +150,13 @@ def test_the_mirror_image_is_paid_the_same_term_by_term_and_for_the_same_changes
 def test_training_augments_with_what_the_mirrored_simulation_shows(walked):
     gait, both = walked
     recipe = Recipe(robots=2 * ROBOTS, steps=2, ppo=PpoConfig(hidden=(4,)), threads=1)
-    symmetry = Learner(both.env, recipe).ppo.symmetry
-    assert symmetry.use_data_augmentation
+    mirror = Learner(both.env, recipe).ppo.mirror
     seen = both.seen[-1]
     actions = np.random.default_rng(0).normal(size=(ROBOTS, 12)).astype(np.float32)
-    obs, doubled = symmetry.data_augmentation_func(
-        env=None, obs=as_tensors(seen[:ROBOTS]), actions=torch.from_numpy(actions)
-    )
-    np.testing.assert_allclose(obs["policy"].numpy(), seen, atol=1e-4, err_msg=gait)
-    np.testing.assert_array_equal(doubled.numpy()[ROBOTS:], mirrored_joints(actions))
+    image = mirror.observation(torch.from_numpy(seen[:ROBOTS])).numpy()
+    np.testing.assert_allclose(image, seen[ROBOTS:], atol=1e-4, err_msg=gait)
+    imaged = mirror.action(torch.from_numpy(actions)).numpy()
+    np.testing.assert_array_equal(imaged, mirrored_joints(actions))
 
 
 def test_the_shipped_robot_is_paid_nearly_as_its_mirror_image_at_first():

@@ -21,16 +21,16 @@ def test_a_recipe_without_settings_is_the_recipe():
 def test_each_setting_changes_its_own_field_and_is_the_difference():
     changed = with_settings(
         DEFAULT,
-        ("reward.power=-0.05", "ppo.epochs = 3", "stages.flat.iterations=200", "robots=64"),
+        ("reward.power=-0.05", "ppo.epochs = 4", "stages.flat.iterations=200", "robots=64"),
     )
     assert changed.env.reward == replace(DEFAULT.env.reward, power=-0.05)
-    assert changed.ppo == replace(DEFAULT.ppo, epochs=3)
+    assert changed.ppo == replace(DEFAULT.ppo, epochs=4)
     assert changed.stages == (replace(DEFAULT.stages[0], iterations=200), *DEFAULT.stages[1:])
     assert changed.robots == 64
     assert differences(changed, DEFAULT) == {
-        "ppo.epochs": (3, 5),
+        "ppo.epochs": (4, 3),
         "reward.power": (-0.05, DEFAULT.env.reward.power),
-        "stages.flat.iterations": (200, 450),
+        "stages.flat.iterations": (200, 300),
         "robots": (64, 128),
     }
 

@@ -30,7 +30,7 @@ COMMANDS = {
     "transitions": "Test gait shifts of every ordered pair of gaits at random phases of the "
     "stride.",
     "report": "Make one self-contained page of a log or of a training run.",
-    "view": "Show robots in the browser: a live simulation with controls, or a log.",
+    "view": "Show robots in the browser: a live simulation with controls, a log, or a training.",
     "bench": "Measure speed.",
 }
 """The subcommands in the order of `--help`, with the first paragraph of their own help.
