@@ -50,6 +50,8 @@ class TimeToGaitOptions:
     """First seed; 0 by default."""
     baseline_budget: float | None = None
     """Longest training time of the baseline [s]; by default 600, with --quick 1; 0: no baseline."""
+    preset: Literal["default", "three-stage"] | None = None
+    """Recipe whose flat stage trains; default if not given."""
     quick: bool = False
     """Train trot for seconds on few robots: a test run, not a measurement."""
     out: Path | None = None
@@ -61,13 +63,17 @@ class TimeToGaitOptions:
 
     def config(self) -> "TimeToGait":
         """The configuration of the measurement."""
-        from gaitshift.lab.benchmark.time_to_gait import TimeToGait
+        from gaitshift.lab.benchmark.time_to_gait import TimeToGait, flat_stage
 
-        given = {
+        given: dict[str, Any] = {
             name: getattr(self, name)
             for name in ("gaits", "seeds", "first_seed", "baseline_budget")
             if getattr(self, name) is not None
         }
+        if self.preset is not None:
+            if self.quick:
+                raise GaitshiftError("--quick trains on a recipe of its own: no --preset")
+            given["recipe"] = flat_stage(self.preset)
         return replace(TimeToGait.quick() if self.quick else TimeToGait(), **given)
 
 

@@ -16,7 +16,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.lab.benchmark.outcome import Outcome
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
-from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.recipe import PRESETS, Recipe
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,8 +71,9 @@ GAITSHIFT, BASELINE = "gaitshift", "stable-baselines3"
 """Names of the learners in outcomes."""
 
 
-def _flat_stage() -> Recipe:
-    recipe = Recipe()
+def flat_stage(preset: str = "default") -> Recipe:
+    """The first stage of a preset, on flat ground."""
+    recipe = PRESETS[preset]()
     return recipe.with_iterations(recipe.stages[0].iterations)
 
 
@@ -88,7 +89,7 @@ class TimeToGait:
     """First seed; the others follow it."""
     baseline_budget: float = 600.0
     """Training time after which a baseline is stopped [s]; 0: no baseline."""
-    recipe: Recipe = field(default_factory=_flat_stage)
+    recipe: Recipe = field(default_factory=flat_stage)
     """Ours: the flat stage of the default recipe; a training is stopped at its end."""
     check: Criterion = field(default_factory=Criterion)
     """The criterion that ends a training."""
