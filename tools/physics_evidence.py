@@ -22,7 +22,7 @@ from gaitshift.control import policy
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.sim.terrain import from_spec
+from gaitshift.sim.terrain import flat, from_spec
 from gaitshift.sim.world import World
 from gaitshift.sim.world import world as world_module
 from gaitshift.sim.world.model import COARSE_IMPEDANCE, COARSE_STEP, build_model
@@ -136,7 +136,7 @@ def times() -> dict[str, float]:
     worlds: dict[str, World] = {}
     for name, change in CHANGES.items():
         with changed(change):
-            worlds[name] = World(ANYMAL_B, from_spec("flat"), 128)
+            worlds[name] = World(ANYMAL_B, flat(20.0, 20.0), 128)
     targets = np.random.default_rng(0).normal(ANYMAL_B.stance_angles, 0.15, (60, 128, 12))
     taken: dict[str, list[float]] = {name: [] for name in worlds}
     for _ in range(TURNS + 1):
@@ -167,7 +167,7 @@ def dropped() -> tuple[float, int]:
 
 def crept() -> float:
     """Median speed of standing feet over the ground [mm/s]."""
-    world = World(ANYMAL_B, from_spec("flat"), 8)
+    world = World(ANYMAL_B, flat(20.0, 20.0), 8)
     yaw = np.linspace(0.0, 3.0, 8)
     world.place(np.arange(8), xy=np.zeros((8, 2)), yaw=yaw)
     stance = np.tile(ANYMAL_B.stance_angles, (8, 1))
