@@ -51,7 +51,7 @@ def test_shapes_that_are_only_drawn_are_left_out_and_the_motion_is_the_same_to_t
 
 
 def test_coarse_physics_stands_as_exact_physics_does():
-    """Three steps in place of four; the robot's weight on its feet, and the stance a little lower."""
+    """Three steps in place of four; the robot's weight on its feet, the stance a little lower."""
     worlds = [World(ANYMAL_B, LEVEL, 1, fidelity=of) for of in ("exact", "coarse")]
     exact, coarse = (stand(world, 200)[1] for world in worlds)
     assert [world.model.opt.timestep for world in worlds] == [0.0025, pytest.approx(0.01 / 3)]
