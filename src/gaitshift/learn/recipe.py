@@ -185,13 +185,12 @@ _POLISH = replace(
     averaged=0.5,
 )
 
-_EXACT_STAGES = (Stage(name="flat", iterations=450), _ROUGH, _POLISH)
+_EARLIER_STAGES = (Stage(name="flat", iterations=450), _ROUGH, _POLISH)
 
 _STAGES = (
-    Stage(name="flat", iterations=300, fidelity="coarse"),
-    replace(_ROUGH, iterations=500, fidelity="coarse", kl_factor=1.5),
-    replace(_POLISH, iterations=120, fidelity="coarse", kl_factor=1.0, settle=0.0, averaged=0.0),
-    replace(_POLISH, name="finish", iterations=150, kl_factor=1.0),
+    Stage(name="flat", iterations=350),
+    replace(_ROUGH, iterations=450, kl_factor=1.5),
+    replace(_POLISH, iterations=250, kl_factor=1.0),
 )
 
 _EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
@@ -309,8 +308,8 @@ class Recipe:
 
     @classmethod
     def three_stage(cls) -> "Recipe":
-        """The recipe by which the shipped trot and bound are trained: exact physics throughout."""
-        return cls(ppo=_EACH_MINI_BATCH, stages=_EXACT_STAGES)
+        """The recipe by which the shipped trot and bound are trained."""
+        return cls(ppo=_EACH_MINI_BATCH, stages=_EARLIER_STAGES)
 
     @classmethod
     def two_stage(cls) -> "Recipe":
