@@ -30,7 +30,7 @@ def test_each_setting_changes_its_own_field_and_is_the_difference():
     assert differences(changed, DEFAULT) == {
         "ppo.epochs": (4, 3),
         "reward.power": (-0.05, DEFAULT.env.reward.power),
-        "stages.flat.iterations": (200, 350),
+        "stages.flat.iterations": (200, 400),
         "robots": (64, 128),
     }
 

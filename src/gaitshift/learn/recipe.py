@@ -188,9 +188,9 @@ _POLISH = replace(
 _EARLIER_STAGES = (Stage(name="flat", iterations=450), _ROUGH, _POLISH)
 
 _STAGES = (
-    Stage(name="flat", iterations=350),
-    replace(_ROUGH, iterations=450, kl_factor=1.5),
-    replace(_POLISH, iterations=250, kl_factor=1.0),
+    Stage(name="flat", iterations=400),
+    replace(_ROUGH, kl_factor=1.0),
+    replace(_POLISH, kl_factor=0.7),
 )
 
 _EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
