@@ -30,6 +30,7 @@ from pathlib import Path
 from types import FrameType
 
 import numpy as np
+import onnx
 
 from gaitshift import table
 from gaitshift.control import policy
@@ -165,7 +166,9 @@ def _content(path: Path) -> bytes:
     if path.suffix == ".npz":
         with np.load(path) as arrays:
             return b"".join(name.encode() + arrays[name].tobytes() for name in sorted(arrays))
-    return path.read_bytes()
+    return onnx.load(
+        path
+    ).graph.SerializeToString()  # beside it stands the command, with its folder
 
 
 # System calls -------------------------------------------------------------------------------------
