@@ -150,8 +150,8 @@ class WholeUpdatePPO(PPO):
     def _losses(self, part: dict[str, torch.Tensor], turn: int) -> tuple[torch.Tensor, float]:
         """The loss of a seen mini-batch, and its value loss.
 
-        The actor learns from samples and their images. The critic, of which less depends, learns
-        from either in turn, which takes a quarter less time.
+        The actor learns from samples and their images, the critic from either in turn: trainings
+        then take as many iterations, and an update a quarter less time.
         """
         value = self.critic.mlp(part["observation"][:, turn]).squeeze(-1)
         log_prob = self._distribution.log_prob(part["action"])
