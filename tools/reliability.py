@@ -525,12 +525,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     check, usual, called = CHECKS[asked.check]
-    path = RESULTS / "reliability.csv"
-    rows = [dict(one) for one in table.read(path)] if path.is_file() else []
-    rows = [one for one in rows if one["check"] != called]
+    found: list[table.Row] = []
     for one in check(asked.tries or usual, asked.seed):
         print(one, flush=True)
-        rows.append(one)
+        found.append(one)
+    path = RESULTS / "reliability.csv"  # read last: another check may have ended meanwhile
+    earlier = [dict(one) for one in table.read(path)] if path.is_file() else []
+    rows = [*(one for one in earlier if one["check"] != called), *found]
     write_page(sorted(rows, key=lambda one: [c[2] for c in CHECKS.values()].index(one["check"])))
 
 
