@@ -529,10 +529,16 @@ def main() -> None:
     for one in check(asked.tries or usual, asked.seed):
         print(one, flush=True)
         found.append(one)
-    path = RESULTS / "reliability.csv"  # read last: another check may have ended meanwhile
+        _keep(found, called)
+
+
+def _keep(found: list[table.Row], called: str) -> None:
+    """Puts the rows of a check in the place of its earlier ones."""
+    path = RESULTS / "reliability.csv"
     earlier = [dict(one) for one in table.read(path)] if path.is_file() else []
     rows = [*(one for one in earlier if one["check"] != called), *found]
-    write_page(sorted(rows, key=lambda one: [c[2] for c in CHECKS.values()].index(one["check"])))
+    order = [name for *_, name in CHECKS.values()]
+    write_page(sorted(rows, key=lambda one: order.index(one["check"])))
 
 
 _Raw = argparse.RawDescriptionHelpFormatter

@@ -28,7 +28,7 @@ TURNS = 3
 """Turns in which two versions, or two commands, are measured alternately."""
 TRAINED = (128, 1024, 2048)
 """Numbers of robots whose training memory is measured."""
-LARGE = 1.4e9
+LARGE = 0.35e9
 """Size of the table that `identify` reads [bytes]."""
 
 PAGE = """# How fast is it?
