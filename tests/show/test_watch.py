@@ -47,6 +47,15 @@ def test_the_curve_of_a_training_has_its_whole_rows(folder):
     assert all(len(values) == 0 for values in Training(folder).curve().values())
 
 
+@pytest.mark.parametrize(
+    "text", ["iteration,speed\n1,0.1\n", CURVE.replace("0.5", "often"), "a\n1\n"]
+)
+def test_another_table_in_the_place_of_the_curve_is_named(folder, text):
+    (folder / "progress.csv").write_text(text)
+    with pytest.raises(GaitshiftError, match=r"progress.csv.* is damaged"):
+        Training(folder).curve()
+
+
 def test_a_newer_policy_is_seen_once(folder, monkeypatch):
     monkeypatch.setattr("gaitshift.show.viewer.training.LOOK_EVERY", 0.0)
     training = Training(folder)
@@ -170,16 +179,14 @@ def test_the_page_ends_with_a_training_that_is_killed(tmp_path, port):
     wait_until(lambda: not is_served(port))
 
 
-def test_a_taken_port_is_one_line_and_the_training_can_begin_again(tmp_path, capsys):
+def test_a_taken_port_is_one_line_before_anything_is_written(tmp_path, capsys):
     pytest.importorskip("torch")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        arguments = ["train", "trot", "--robots", "2", "--iterations", "1", "--threads", "1"]
-        folder = str(tmp_path / "run")
         with pytest.raises(SystemExit) as end:
-            main([*arguments, "--out", folder, "--watch", "--port", port])
+            main(["train", "trot", "--out", str(tmp_path / "run"), "--watch", "--port", port])
     assert end.value.code == 2
     assert f"cannot listen on 127.0.0.1:{port}" in capsys.readouterr().err.splitlines()[-1]
-    main(["train", "--resume", folder])
+    assert list(tmp_path.iterdir()) == []

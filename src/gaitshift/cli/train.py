@@ -4,7 +4,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import inf
@@ -72,12 +72,16 @@ class Train(RobotOption):
     def run(self) -> None:
         """Trains, with a progress bar."""
         folder, begin = self._beginning()
-        with only_writer(folder):
+        page = Watch(self.port) if self.watch else None
+        with page or nullcontext(), only_writer(folder):
             run = begin(folder)
+            if page is not None:
+                run.export()
+                page.show(folder)
             bar = _Bar(run)
             try:
-                with self._page(run), bar:
-                    every = PUBLISH_EVERY if self.watch else inf
+                with bar:
+                    every = inf if page is None else PUBLISH_EVERY
                     path = run.train(bar, bar.judge, bar.keep, publish_every=every)
             except KeyboardInterrupt as stop:
                 command = f"gaitshift train --resume {folder}"
@@ -88,13 +92,6 @@ class Train(RobotOption):
         if bar.verdict:
             print(f"{_spell(bar.verdict)}, {bar.verdict['misses'] or 'no limit missed'}")
         print(f"policy written to {path}; evaluate it with: gaitshift evaluate {path}")
-
-    def _page(self, run: "Run") -> AbstractContextManager[None]:
-        """The page of the training, if it is asked for."""
-        if not self.watch:
-            return nullcontext()
-        run.export()
-        return Watch(run.folder, self.port)
 
     def _beginning(self) -> tuple[Path, "Callable[[Path], Run]"]:
         """The folder of the run, and what begins or resumes it there."""

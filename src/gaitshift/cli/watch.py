@@ -3,10 +3,11 @@
 import multiprocessing
 import os
 import signal
+import threading
+from contextlib import suppress
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from gaitshift.cli.output import say
 from gaitshift.cli.view import RECORDINGS, save_recording
@@ -18,31 +19,38 @@ PUBLISH_EVERY = 3.0
 """Time between two policies for the page [s]; ours: one costs 0.1 s."""
 
 
+LEAST = 19
+"""The lowest priority of a process that still gets some time beside others."""
+
+
 class Watch:
-    """Serves the live page of a training during the block."""
+    """A page during the block, which shows a training once it is told of it."""
 
-    def __init__(self, folder: Path, port: int) -> None:
-        self._folder, self._port = folder, port
+    def __init__(self, port: int) -> None:
+        self._port = port
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> "Watch":
         """Returns when the page can be opened.
 
         Raises:
             GaitshiftError: a package is missing, or the port is taken.
         """
         context = multiprocessing.get_context("spawn")
-        here, there = context.Pipe()
-        self._process = context.Process(
-            target=_serve, args=(self._folder, self._port, there), daemon=True
-        )
+        self._connection, there = context.Pipe()
+        self._process = context.Process(target=_serve, args=(self._port, there), daemon=True)
         self._process.start()
         there.close()
         try:
-            problem: str = here.recv()
+            problem: str = self._connection.recv()
         except EOFError:
             problem = "the page of --watch ended at once"
         if problem:
             raise GaitshiftError(problem)
+        return self
+
+    def show(self, folder: Path) -> None:
+        """Shows the training in this folder, which has a policy."""
+        self._connection.send(folder)
         say(f"watch it at http://{HOST}:{self._port}")
 
     def __exit__(self, *_: object) -> None:
@@ -50,32 +58,35 @@ class Watch:
         self._process.join()
 
 
-def _serve(folder: Path, port: int, ready: "Connection[str, Any]") -> None:
+def _serve(port: int, connection: "Connection[str, Path]") -> None:
     """Serves the page until the training ends, also if it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the training ends first, and then this page
-    _yield_to_others()
     try:
         from gaitshift.show.viewer import LivePage, Training, close, serve
 
-        training = Training(folder)
         server = serve(HOST, port)
     except GaitshiftError as error:
-        ready.send(str(error))
+        connection.send(str(error))
         return
     except ImportError as error:
-        ready.send(f"--watch needs the package '{error.name}'; install gaitshift[view]")
+        connection.send(f"--watch needs the package '{error.name}'; install gaitshift[view]")
         return
+    connection.send("")
+    try:
+        folder = connection.recv()
+    except EOFError:  # the training did not begin
+        return
+    training = Training(folder)
     save = partial(save_recording, folder=RECORDINGS, robot=training.robot)
     page = LivePage(server, training.live(), save, training)
-    ready.send("")
+    _yield_to_others()  # not before: on a busy machine the page would not come to be
     parent = multiprocessing.parent_process()
     page.run(lambda: parent is not None and not parent.is_alive())
     close(server)
 
 
 def _yield_to_others() -> None:
-    """Gives this process the lowest priority, so that it takes only the time that is left."""
-    if hasattr(os, "SCHED_IDLE"):
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
-    elif hasattr(os, "nice"):
-        os.nice(19)
+    """Gives all threads of this process the lowest priority, so that it takes idle time."""
+    for thread in threading.enumerate():
+        with suppress(OSError, AttributeError):  # Windows has none
+            os.setpriority(os.PRIO_PROCESS, thread.native_id or 0, LEAST)

@@ -80,13 +80,13 @@ class LivePage:
     def _learn(self) -> None:
         """Takes the newest policy of the training, if there is one."""
         policy = self._training.look() if self._training is not None else None
-        if policy is not None:
-            self._live.learn(policy)
-            self._draw_curves()
-
-    def _draw_curves(self) -> None:
-        if self._training is not None:
+        if policy is None or self._training is None:
+            return
+        self._live.learn(policy)
+        try:
             self._curves.draw(self._training)
+        except GaitshiftError as error:
+            self._refuse(error)
 
     def _advance(self) -> Frame | None:
         """Runs the steps that are due; returns the last frame, None without a step."""
@@ -111,7 +111,7 @@ class LivePage:
         if self._training is not None:
             with panel.add_tab("Training"):
                 self._curves = Curves(gui)
-            self._draw_curves()
+            self._curves.draw(self._training)
         with panel.add_tab("Signals"):
             self._charts = Charts(self._server, self._live.machines)
         panel.dock_left()

@@ -6,16 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from gaitshift import table
 from gaitshift.control import policy
 from gaitshift.control.policy import Policy
 from gaitshift.data import located
 from gaitshift.errors import GaitshiftError
-from gaitshift.learn import run_folder
+from gaitshift.learn import progress, run_folder
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.robot_file import from_dict
 from gaitshift.show.plots.style import INK, PALE, QUIET
 from gaitshift.show.viewer.live import LiveConfig, LiveRun
+from gaitshift.show.viewer.server import as_markdown
 
 LOOK_EVERY = 1.0
 """Time between two looks at the folder [s]."""
@@ -36,7 +36,8 @@ class Training:
         config = run_folder.read_config(folder)
         self.folder = folder
         with located(f"{folder / run_folder.CONFIG} is damaged"):
-            self.robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
+            robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
+        self.robot = robot
         """The robot that is trained."""
         self._stamp = (0, 0)
         self._looked = time.monotonic()
@@ -61,18 +62,20 @@ class Training:
         config = LiveConfig(track="flat@300", start=gait, is_autonomous=False)
         return LiveRun(config, {gait: self.policy})
 
-    @property
-    def iterations(self) -> int:
-        """Iterations by which the policy was trained."""
-        return int(self.policy.info.training.get("iterations", 0))
-
     def curve(self) -> dict[str, np.ndarray]:
-        """The drawn columns of progress.csv and `iteration`, one value an iteration."""
+        """The drawn columns of progress.csv and `iteration`, one value an iteration.
+
+        Raises:
+            GaitshiftError: the file is damaged.
+        """
         path = self.folder / run_folder.PROGRESS
-        rows = table.read(path, may_be_cut=True) if path.is_file() else []
-        return {
-            name: np.array([float(row[name]) for row in rows]) for name in ("iteration", *_CURVES)
-        }
+        rows, names = progress.read(path), ("iteration", *_CURVES)
+        try:
+            return {name: np.array([float(row[name]) for row in rows]) for name in names}
+        except (KeyError, ValueError) as error:
+            raise GaitshiftError(
+                f"{path} is damaged: it must have numbers as {', '.join(names)}"
+            ) from error
 
     def _read(self) -> Policy:
         path = self.folder / run_folder.POLICY
@@ -112,9 +115,9 @@ class Curves:
         """Draws the curve up to now."""
         curve = training.curve()
         done = len(curve["iteration"])
-        self._text.content = (
-            f"**{training.policy.gait.replace('_', '-')}**, iteration {done}; the robot walks as "
-            f"learned after {training.iterations}"
+        learned = training.policy.info.training.get("iterations", 0)
+        self._text.content = as_markdown(
+            f"{training.policy.gait}, iteration {done}, the robot walks as learned after {learned}"
         )
         if done >= 2:
             for name, chart in self._charts.items():
