@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gaitshift.errors import GaitshiftError
@@ -241,6 +241,8 @@ PIECES = st.builds(
 
 @settings(max_examples=100, deadline=None)
 @given(spec=st.one_of(st.text(max_size=20), st.lists(PIECES, max_size=3).map(",".join)))
+@example(spec="flat:\x1e0")  # a sign that parts lines
+@example(spec="\u2028@2")
 def test_any_text_is_a_terrain_or_one_line_of_error(spec):
     try:
         terrain = from_spec(spec, seed=0, length=4.0, width=1.0, cell=0.05)
