@@ -28,7 +28,7 @@ from gaitshift.gait import RewardMachine, gaits, mermaid
 from gaitshift.lab.identification.log_files import passages
 from gaitshift.lab.log import Log
 from gaitshift.lab.npz import arrays_in
-from gaitshift.learn import run as runs
+from gaitshift.learn import checkpoint
 from gaitshift.robot.description import Gains
 from gaitshift.robot.robot_file import read_robot
 from gaitshift.shift import load_graph
@@ -449,7 +449,7 @@ STATES = {
 @pytest.mark.parametrize("name", STATES)
 def test_a_checkpoint_that_is_none_is_named(tmp_path, name):
     torch.save(STATES[name], tmp_path / "000006.pt")
-    assert "is damaged; remove it" in refusal(runs._read_checkpoint, tmp_path / "000006.pt")
+    assert "is damaged; remove it" in refusal(checkpoint.read, tmp_path / "000006.pt")
 
 
 # Tables -----------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from statistics import median
-from typing import cast
+from typing import Any
 from unittest import mock
 
 import mujoco
@@ -124,8 +124,8 @@ COARSE = "coarse: 3.3 ms, pyramidal, tolerance 1e-4"
 def changed(change: Change) -> Iterator[None]:
     """Every world that is built meanwhile has this change of exact physics."""
 
-    def build(*arguments: object) -> mujoco.MjModel:
-        model = build_model(*cast("tuple[()]", arguments))
+    def build(*arguments: Any) -> mujoco.MjModel:
+        model = build_model(*arguments)
         change(model)
         return model
 

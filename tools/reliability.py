@@ -25,7 +25,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -217,7 +216,6 @@ def _fails_badly(call: str, error: str, number: int, folder: Path) -> bool:
         encoding="utf-8",
         check=False,
     )
-    again = [*GAITSHIFT, *work.words, "--out", str(folder), "--overwrite"]
     second = subprocess.run(
         _command(work, folder, Path()),
         capture_output=True,
@@ -229,14 +227,14 @@ def _fails_badly(call: str, error: str, number: int, folder: Path) -> bool:
     is_bad = TRACEBACK in said or second.returncode != 0
     if is_bad:
         FOUND.mkdir(parents=True, exist_ok=True)
-        (FOUND / f"{call}-{number}.txt").write_text(f"{' '.join(again)}\n{said}", encoding="utf-8")
+        (FOUND / f"{call}-{number}.txt").write_text(said, encoding="utf-8")
     return is_bad
 
 
 # Damaged files ------------------------------------------------------------------------------------
 
 PONY = ROOT / "examples" / "robots" / "pony.toml"
-SHARE_OF_TIME = 5.0
+LONGEST = 5.0
 """Longest that a file may take to be read or refused [s]."""
 
 
@@ -347,7 +345,7 @@ def _read_all(name: str, tries: int, seed: int) -> tuple[int, float, int, float]
             content = damaged(whole, rng)
             path.write_bytes(content)
             start = time.perf_counter()
-            signal.setitimer(signal.ITIMER_REAL, SHARE_OF_TIME)
+            signal.setitimer(signal.ITIMER_REAL, LONGEST)
             try:
                 reader.read(path)
             except GaitshiftError as error:
@@ -494,7 +492,7 @@ def write_page(rows: list[table.Row]) -> None:
         f"{tries} kills and failing system calls and {files} damaged files caused {faults or 'no'} "
         f"fault{'' if faults == 1 else 's'}."
     )
-    text = HEAD.format(answer=answer, limit=SHARE_OF_TIME)
+    text = HEAD.format(answer=answer, limit=LONGEST)
     cells = [tuple(str(one[name]) for name in COLUMNS) for one in rows]
     text += table.markdown(COLUMNS, cells) + "\n"
     (RESULTS / "reliability.md").write_text(text, encoding="utf-8")
@@ -519,7 +517,9 @@ CHECKS: dict[str, tuple[Callable[[int, int], Iterator[table.Row]], int, str]] = 
 
 def main() -> None:
     """Makes one check, and adds its rows."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=partial(_Raw))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("check", choices=CHECKS)
     parser.add_argument("--tries", type=int)
     parser.add_argument("--seed", type=int, default=0)
@@ -540,8 +540,6 @@ def _keep(found: list[table.Row], called: str) -> None:
     order = [name for *_, name in CHECKS.values()]
     write_page(sorted(rows, key=lambda one: order.index(one["check"])))
 
-
-_Raw = argparse.RawDescriptionHelpFormatter
 
 if __name__ == "__main__":
     main()

@@ -28,7 +28,7 @@ from gaitshift.lab.identification.statistics import wilson
 from gaitshift.lab.reproduction.plan import Job, Setting
 from gaitshift.lab.reproduction.training import train_all
 from gaitshift.lab.studies.transitions import Pair, run_pair
-from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.presets import three_stage
 from gaitshift.learn.run_folder import POLICY
 from gaitshift.sim.reward import ADDITIONS, BONUS_SHARES
 from gaitshift.table import markdown
@@ -95,7 +95,7 @@ class Default(Setting):
 
 def setting(iterations: int, without: str | None = None, name: str = "default") -> Default:
     """The first iterations of the recipe on one core, without one of the additions."""
-    recipe = replace(Recipe.three_stage(), threads=1, physics_threads=1)
+    recipe = replace(three_stage(), threads=1, physics_threads=1)
     recipe = recipe.with_iterations(iterations)
     if without is not None:
         reward = replace(recipe.env.reward, **{without: 0.0})
@@ -126,7 +126,7 @@ def judged(
 
 def write_seeds(processes: int, seeds: int) -> Path:
     """The table of fresh seeds, from 1 on."""
-    flat = Recipe.three_stage().stages[0].iterations
+    flat = three_stage().stages[0].iterations
     jobs = jobs_of([setting(flat)], FIRST_GAITS, range(1, seeds + 1))
     figures = judged(jobs, processes)
     unaided = judged(jobs, processes, replace(JUDGED, open_loop=True))
@@ -159,7 +159,7 @@ def write_seeds(processes: int, seeds: int) -> Path:
         f" of {seeds}"
         for gait in FIRST_GAITS
     ]
-    steps = flat * Recipe.three_stage().robots * Recipe.three_stage().steps / 1e6
+    steps = flat * three_stage().robots * three_stage().steps / 1e6
     text = SEEDS_HEAD.format(clean=", ".join(clean), iterations=flat, steps=steps, seeds=seeds)
     return _write("seeds.md", text, head, rows)
 
@@ -202,7 +202,7 @@ def write_additions(processes: int, seeds: int) -> Path:
 
 def write_shifts(processes: int, seeds: int) -> Path:
     """The table of shifts into policies that were trained for them, and into others."""
-    plain = Recipe(threads=1, physics_threads=1)
+    plain = replace(three_stage(), threads=1, physics_threads=1)
     flat, *rough = plain.stages
     starts = (replace(stage, mixed_starts=MIXED_STARTS) for stage in rough)
     mixed = replace(plain, stages=(flat, *starts))

@@ -14,7 +14,7 @@ from gaitshift.lab.reproduction.judging import curve_rows, run_rows
 from gaitshift.lab.reproduction.learning_curve import LearningCurve, median_iteration
 from gaitshift.lab.reproduction.plan import ABLATIONS, AS_IN_THE_PAPER, REFERENCE, Plan
 from gaitshift.lab.reproduction.results import EarlierRuns, Results, Seeds
-from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.presets import paper
 from gaitshift.learn.run import Run
 from gaitshift.show.plots.reproduction import Landmarks, comparison_curves, reward_curves
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
@@ -62,7 +62,7 @@ def test_each_ablation_changes_what_it_names_and_nothing_else(setting):
 
 
 def test_the_reference_is_the_paper_on_one_core_and_on_gains_that_stand():
-    changed = difference(asdict(Recipe.paper()), asdict(REFERENCE.recipe))
+    changed = difference(asdict(paper()), asdict(REFERENCE.recipe))
     assert changed == {"env/gains": "default", "threads": 1, "physics_threads": 1}
 
 
@@ -100,16 +100,16 @@ def test_a_plan_is_all_settings_gaits_and_seeds_and_parts_can_be_picked():
 
 
 def test_the_factor_on_penalties_grows_in_a_straight_line():
-    recipe = replace(Recipe.paper(), penalty_start=0.2, penalty_until=100)
+    recipe = replace(paper(), penalty_start=0.2, penalty_until=100)
     table = {0: 0.2, 25: 0.4, 50: 0.6, 100: 1.0, 101: 1.0, 499: 1.0}
     assert {i: round(recipe.curriculum(i).penalty_scale, 9) for i in table} == table
-    assert {Recipe.paper().curriculum(i).penalty_scale for i in table} == {1.0}
+    assert {paper().curriculum(i).penalty_scale for i in table} == {1.0}
 
 
 @pytest.mark.parametrize("start", [-0.1, 1.1])
 def test_a_factor_on_penalties_beyond_0_to_1_is_refused(start):
     with pytest.raises(GaitshiftError, match="penalty_start"):
-        replace(Recipe.paper(), penalty_start=start)
+        replace(paper(), penalty_start=start)
 
 
 def test_the_factor_is_on_the_penalties_and_on_nothing_else():

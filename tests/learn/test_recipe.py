@@ -11,7 +11,8 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.benchmark.baseline import GaitVecEnv
 from gaitshift.learn.learner import Learner
-from gaitshift.learn.recipe import PRESETS, Stage
+from gaitshift.learn.presets import PRESETS
+from gaitshift.learn.recipe import Stage
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.reward import RewardConfig
 from gaitshift.sim.terrain import flat

@@ -11,7 +11,8 @@ import pytest
 
 from gaitshift.control import policy
 from gaitshift.learn.ground import draw_grounds
-from gaitshift.learn.recipe import PRESETS, PpoConfig, Recipe
+from gaitshift.learn.presets import PRESETS
+from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.learn.run import Run
 from gaitshift.sim.env import Curriculum, EnvConfig
 from gaitshift.sim.reward import BONUS_SHARES, RewardConfig

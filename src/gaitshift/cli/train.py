@@ -96,7 +96,7 @@ class Train(RobotOption):
     def _beginning(self) -> tuple[Path, "Callable[[Path], Run]"]:
         """The folder of the run, and what begins or resumes it there."""
         try:
-            from gaitshift.learn.recipe import PRESETS
+            from gaitshift.learn.presets import PRESETS
             from gaitshift.learn.run import Run
             from gaitshift.learn.settings import differences, with_settings
         except ImportError as error:

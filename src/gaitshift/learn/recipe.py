@@ -161,7 +161,7 @@ class Stage:
         return max(self.amplitude, self.slope, self.stair, self.step) > 0
 
 
-_ROUGH = Stage(
+ROUGH = Stage(
     name="rough",
     iterations=470,
     amplitude=0.16,
@@ -170,31 +170,22 @@ _ROUGH = Stage(
     step=0.15,
     push=130.0,
     swing_factor=1.4,
-    kl_factor=2.0,
     horizon_factor=2.0,
     trace_factor=2.5,
 )
+"""Rough ground with pushes: robots learn to stay up."""
 
-_POLISH = replace(
-    _ROUGH,
+POLISH = replace(
+    ROUGH,
     name="polish",
     iterations=300,
     trace_factor=1.0,
     fields=_shared_out(flat=5, perlin=2, slope=1, stair=2, step=2),
     settle=1.0,
     averaged=0.5,
+    kl_factor=0.7,
 )
-
-_EARLIER_STAGES = (Stage(name="flat", iterations=450), _ROUGH, _POLISH)
-
-_STAGES = (
-    Stage(name="flat", iterations=400),
-    replace(_ROUGH, kl_factor=1.0),
-    replace(_POLISH, kl_factor=0.7),
-)
-
-_EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
-"""PPO as in rsl_rl."""
+"""The same with more level fields: the gait becomes clean again."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -205,7 +196,7 @@ class Recipe:
     """The environment."""
     ppo: PpoConfig = field(default_factory=PpoConfig)
     """The algorithm."""
-    stages: tuple[Stage, ...] = _STAGES
+    stages: tuple[Stage, ...] = (Stage(name="flat", iterations=400), ROUGH, POLISH)
     """Flat ground, then Perlin ground with pushes (paper III-D) in two stages: the first makes the
     policy robust, the second makes the gait clean again."""
     robots: int = 128
@@ -306,64 +297,7 @@ class Recipe:
         last = self.stages[-1]
         return last.averaged > 0 and iteration >= self.iterations - last.averaged * last.iterations
 
-    @classmethod
-    def three_stage(cls) -> "Recipe":
-        """The recipe by which the shipped trot and bound are trained."""
-        return cls(ppo=_EACH_MINI_BATCH, stages=_EARLIER_STAGES)
-
-    @classmethod
-    def two_stage(cls) -> "Recipe":
-        """`three_stage` without the last stage, by which the other shipped policies are trained.
-
-        The last 35 % of all iterations settle, and actors are averaged over the last 24 %.
-        """
-        rough, total = replace(_ROUGH, trace_factor=1.0), 350 + _ROUGH.iterations
-        settle, averaged = (share * total / _ROUGH.iterations for share in (0.35, 0.24))
-        last = replace(rough, settle=settle, averaged=averaged)
-        return cls(ppo=_EACH_MINI_BATCH, stages=(Stage(name="flat", iterations=350), last))
-
-    @classmethod
-    def paper(cls) -> "Recipe":
-        """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
-
-        PPO has these defaults of stable-baselines3, the library that the paper names: 10 epochs,
-        mini-batches of 64 (63 here, as 47 parts of 3000), learning rate 3e-4 without adaptation,
-        γ, λ, clipping, no entropy bonus, no normalisation of observations. Four settings stay those
-        of rsl_rl: the weight of the value loss (1; stable-baselines3: 0.5), the largest norm of
-        gradients (1 for each network; 0.5 for both), the normalisation of advantages (over the
-        batch; over each mini-batch) and Adam's ε (1e-8; 1e-5).
-        """
-        return cls(
-            env=EnvConfig.paper(),
-            ppo=PpoConfig(
-                epochs=10,
-                mini_batches=47,
-                learning_rate=3e-4,
-                adapts="mini_batch",
-                desired_kl=0.0,
-                entropy=0.0,
-                initial_std=1.0,
-                reward_scale=1.0,
-                normalize_observations=False,
-                mirror=False,
-                fused_adam=True,
-            ),
-            stages=(Stage(name="flat", iterations=500, settle=0.0, averaged=0.0),),
-            robots=30,
-            steps=100,
-            strict_share=0.0,
-        )
-
 
 def _grown(iteration: int, start: float, end: float) -> float:
     """0 until `start`, 1 from `end` on, and a straight line in between."""
     return min(max((iteration - start) / (end - start), 0.0), 1.0)
-
-
-PRESETS = {
-    "default": Recipe,
-    "three-stage": Recipe.three_stage,
-    "two-stage": Recipe.two_stage,
-    "paper": Recipe.paper,
-}
-"""Recipes by the name that `gaitshift train --preset` takes."""

@@ -19,6 +19,7 @@ from torch.utils.tensorboard import SummaryWriter
 from gaitshift import table
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
+from gaitshift.learn import checkpoint
 from gaitshift.learn.export import describe, export
 from gaitshift.learn.ground import FIELD, draw_grounds
 from gaitshift.learn.learner import Learner
@@ -41,7 +42,7 @@ from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.sim.world import Divergence
 from gaitshift.table import Row
-from gaitshift.whole_file import flush_to_disk, replacing, write_text
+from gaitshift.whole_file import flush_to_disk, write_text
 
 _STRICT = cattrs.Converter(forbid_extra_keys=True)
 
@@ -150,7 +151,7 @@ class Run:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {faults}") from error
         except GaitshiftError as error:
             raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
-        checkpoints = run._checkpoints()
+        checkpoints = checkpoint.files(folder)
         if checkpoints:
             run._load_checkpoint(checkpoints[-1])
         elif is_barely_begun(folder):
@@ -204,7 +205,7 @@ class Run:
         Raises:
             GaitshiftError: the checkpoint is missing or damaged.
         """
-        self._load_checkpoint(self.folder / CHECKPOINTS / f"{iteration:06d}.pt")
+        self._load_checkpoint(checkpoint.file_of(self.folder, iteration))
         self.export(path)
 
     def export(self, path: Path | None = None) -> None:
@@ -225,10 +226,10 @@ class Run:
         layers = deepcopy(self.learner.ppo.actor.mlp)
         total = {name: weights.clone() for name, weights in layers.state_dict().items()}
         count = 1
-        for path in self._checkpoints():
+        for path in checkpoint.files(self.folder):
             earlier = int(path.stem)
             if earlier < self.iteration and self.recipe.is_averaged(earlier):
-                state = _read_checkpoint(path)["ppo"]["actor_state_dict"]
+                state = checkpoint.read(path)["ppo"]["actor_state_dict"]
                 for name, weights in total.items():
                     weights += state[f"mlp.{name}"]
                 count += 1
@@ -271,14 +272,7 @@ class Run:
         last = self.iteration == self.recipe.iterations
         return last or self.iteration % self.recipe.checkpoint_every == 0
 
-    def _checkpoints(self) -> list[Path]:
-        """The files of the run's checkpoints, in their order."""
-        found = (self.folder / CHECKPOINTS).glob("*.pt")
-        return sorted(path for path in found if path.stem.isdecimal())
-
     def _save_checkpoint(self) -> None:
-        path = self.folder / CHECKPOINTS / f"{self.iteration:06d}.pt"
-        path.parent.mkdir(exist_ok=True)
         state: dict[str, Any] = {
             "iteration": self.iteration,
             "wall_s": self._wall,
@@ -288,11 +282,10 @@ class Run:
         for name in (PROGRESS, VERDICTS):  # their rows up to a checkpoint are never repeated
             if (self.folder / name).is_file():
                 flush_to_disk(self.folder / name)
-        with replacing(path) as part:
-            torch.save(state, part)
+        checkpoint.write(self.folder, state)
 
     def _load_checkpoint(self, path: Path) -> None:
-        state = _read_checkpoint(path)
+        state = checkpoint.read(path)
         self.iteration = state["iteration"]
         self._wall = state["wall_s"]
         try:
@@ -330,23 +323,6 @@ class Run:
         self.export()
         verdict = judge(self.folder / POLICY)
         table.append(self.folder / VERDICTS, {"iteration": self.iteration, **verdict})
-
-
-_CHECKPOINT = {"iteration": int, "wall_s": float, "torch_rng": torch.Tensor, "ppo": dict}
-"""What a checkpoint holds."""
-
-
-def _read_checkpoint(path: Path) -> dict[str, Any]:
-    try:
-        state = torch.load(path, weights_only=True)
-        for name, kind in _CHECKPOINT.items():
-            if not isinstance(state[name], kind):
-                raise TypeError(f"'{name}' is a {type(state[name]).__name__}")
-        return state
-    except Exception as error:  # torch has no common class for a damaged file
-        raise GaitshiftError(
-            f"{path} is damaged; remove it to resume from the checkpoint before it"
-        ) from error
 
 
 def _seed_at(seed: int, iteration: int) -> int:

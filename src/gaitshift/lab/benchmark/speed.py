@@ -118,9 +118,10 @@ def training_speed(seed: int) -> dict[str, float]:
     Raises:
         ImportError: torch or rsl_rl is not installed.
     """
+    from gaitshift.learn.presets import three_stage
     from gaitshift.learn.recipe import Recipe
 
-    recipe, before = Recipe(), Recipe.three_stage()
+    recipe, before = Recipe(), three_stage()
     learners = [_learner(one, seed) for one in (recipe, before)]
     seconds = [[seconds_of(learner.iterate) for learner in learners] for _ in range(ROUNDS)]
     per_iteration = median([now for now, _ in seconds])

@@ -16,7 +16,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.lab.benchmark.outcome import Outcome
 from gaitshift.lab.evaluation import EvaluationConfig, evaluate
-from gaitshift.learn.recipe import PRESETS, Recipe
+from gaitshift.learn.presets import PRESETS
+from gaitshift.learn.recipe import Recipe
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from gaitshift.control.observation import PAPER_SLICES
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
+from gaitshift.learn.presets import paper
 from gaitshift.learn.recipe import Recipe
 from gaitshift.sim.reward import RewardConfig
 
@@ -52,10 +53,10 @@ def _recipe(
     **reward: object,
 ) -> Recipe:
     """The paper's recipe on one core, on gains that hold the robot up, and one thing changed."""
-    paper = Recipe.paper()
-    weights: RewardConfig = replace(paper.env.reward, **reward)
-    env = replace(paper.env, gains=gains, observed=observed, reward=weights)
-    return replace(paper, env=env, penalty_start=penalty_start, threads=1, physics_threads=1)
+    whole = paper()
+    weights: RewardConfig = replace(whole.env.reward, **reward)
+    env = replace(whole.env, gains=gains, observed=observed, reward=weights)
+    return replace(whole, env=env, penalty_start=penalty_start, threads=1, physics_threads=1)
 
 
 _WITHOUT_MACHINE = tuple(s for s in PAPER_SLICES if s not in ("machine_state", "steps_in_state"))

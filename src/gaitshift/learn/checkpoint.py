@@ -1,0 +1,50 @@
+"""The checkpoints of a run: files from which it goes on, one for each of some iterations."""
+
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from gaitshift.errors import GaitshiftError
+from gaitshift.learn.run_folder import CHECKPOINTS
+from gaitshift.whole_file import replacing
+
+_PARTS = {"iteration": int, "wall_s": float, "torch_rng": torch.Tensor, "ppo": dict}
+"""What a checkpoint holds."""
+
+
+def file_of(folder: Path, iteration: int) -> Path:
+    """The file of an iteration in the folder of a run."""
+    return folder / CHECKPOINTS / f"{iteration:06d}.pt"
+
+
+def files(folder: Path) -> list[Path]:
+    """The files of a run's checkpoints, in their order."""
+    found = (folder / CHECKPOINTS).glob("*.pt")
+    return sorted(path for path in found if path.stem.isdecimal())
+
+
+def write(folder: Path, state: dict[str, Any]) -> None:
+    """Writes the checkpoint of the iteration that it names."""
+    path = file_of(folder, state["iteration"])
+    path.parent.mkdir(exist_ok=True)
+    with replacing(path) as part:
+        torch.save(state, part)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A checkpoint.
+
+    Raises:
+        GaitshiftError: it is missing or damaged.
+    """
+    try:
+        state = torch.load(path, weights_only=True)
+        for name, kind in _PARTS.items():
+            if not isinstance(state[name], kind):
+                raise TypeError(f"'{name}' is a {type(state[name]).__name__}")
+        return state
+    except Exception as error:  # torch has no common class for a damaged file
+        raise GaitshiftError(
+            f"{path} is damaged; remove it to resume from the checkpoint before it"
+        ) from error

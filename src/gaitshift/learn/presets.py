@@ -1,0 +1,70 @@
+"""Recipes by name: the default, the earlier ones of the shipped policies, and the paper's."""
+
+from dataclasses import replace
+
+from gaitshift.learn.recipe import POLISH, ROUGH, PpoConfig, Recipe, Stage
+from gaitshift.sim.env import EnvConfig
+
+_EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
+"""PPO as in rsl_rl."""
+
+
+def three_stage() -> Recipe:
+    """The recipe by which the shipped trot and bound are trained."""
+    stages = (
+        Stage(name="flat", iterations=450),
+        *(replace(s, kl_factor=2.0) for s in (ROUGH, POLISH)),
+    )
+    return Recipe(ppo=_EACH_MINI_BATCH, stages=stages)
+
+
+def two_stage() -> Recipe:
+    """`three_stage` without the last stage, by which the other shipped policies are trained.
+
+    The last 35 % of all iterations settle, and actors are averaged over the last 24 %.
+    """
+    rough, total = replace(ROUGH, kl_factor=2.0, trace_factor=1.0), 350 + ROUGH.iterations
+    settle, averaged = (share * total / ROUGH.iterations for share in (0.35, 0.24))
+    last = replace(rough, settle=settle, averaged=averaged)
+    return Recipe(ppo=_EACH_MINI_BATCH, stages=(Stage(name="flat", iterations=350), last))
+
+
+def paper() -> Recipe:
+    """The paper's: 30 robots × 100 steps × 500 iterations, Table I and b, flat ground.
+
+    PPO has these defaults of stable-baselines3, the library that the paper names: 10 epochs,
+    mini-batches of 64 (63 here, as 47 parts of 3000), learning rate 3e-4 without adaptation,
+    γ, λ, clipping, no entropy bonus, no normalisation of observations. Four settings stay those
+    of rsl_rl: the weight of the value loss (1; stable-baselines3: 0.5), the largest norm of
+    gradients (1 for each network; 0.5 for both), the normalisation of advantages (over the
+    batch; over each mini-batch) and Adam's ε (1e-8; 1e-5).
+    """
+    return Recipe(
+        env=EnvConfig.paper(),
+        ppo=PpoConfig(
+            epochs=10,
+            mini_batches=47,
+            learning_rate=3e-4,
+            adapts="mini_batch",
+            desired_kl=0.0,
+            entropy=0.0,
+            initial_std=1.0,
+            reward_scale=1.0,
+            normalize_observations=False,
+            mirror=False,
+            fused_adam=True,
+        ),
+        stages=(Stage(name="flat", iterations=500, settle=0.0, averaged=0.0),),
+        robots=30,
+        steps=100,
+        strict_share=0.0,
+    )
+
+
+PRESETS = {
+    "default": Recipe,
+    "three-stage": three_stage,
+    "two-stage": two_stage,
+    "paper": paper,
+}
+"""Recipes by the name that `gaitshift train --preset` takes."""
