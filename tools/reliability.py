@@ -423,15 +423,18 @@ def _memory_of(process: int) -> float:
 
 def page(tries: int, seed: int) -> Iterator[table.Row]:
     """Rows for each of six parts of this many seconds of the live page with two clients."""
-    import websockets.sync.client as client
+    import viser
+    from websockets.sync.client import connect
+    from websockets.typing import Subprotocol
 
-    port = 8099
+    port, protocol = 8099, Subprotocol(f"viser-v{viser.__version__}")
     command = [*GAITSHIFT, "view", "--port", str(port), "--seed", str(seed)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, encoding="utf-8")
     assert process.stdout is not None
     assert any("open http" in line for line in iter(process.stdout.readline, ""))
     try:
-        clients = [client.connect(f"ws://127.0.0.1:{port}", max_size=None) for _ in range(2)]
+        address = f"ws://127.0.0.1:{port}"
+        clients = [connect(address, subprotocols=[protocol], max_size=None) for _ in range(2)]
         for part in range(6):
             until, received = time.monotonic() + tries / 6, 0
             while time.monotonic() < until:

@@ -1,6 +1,7 @@
 """A run and its folder: written down, broken off, going on with the same bits."""
 
 import csv
+import errno
 import json
 import shutil
 from dataclasses import fields, replace
@@ -8,8 +9,10 @@ from dataclasses import fields, replace
 import numpy as np
 import onnx
 import pytest
+from tensorboard.summary.writer.record_writer import RecordWriter
 
 from gaitshift.control import policy
+from gaitshift.errors import GaitshiftError
 from gaitshift.learn.ground import draw_grounds
 from gaitshift.learn.presets import PRESETS
 from gaitshift.learn.recipe import PpoConfig, Recipe
@@ -241,3 +244,25 @@ def test_divergences_are_counted_and_the_first_are_kept(tmp_path):
     run.train(reported.append, keep=lambda lost, path: kept.append((lost.robot, path.name)))
     assert [row["diverged"] for row in reported] == [1.0] * 6
     assert kept == [(1, f"{iteration:06d}-1.npz") for iteration in range(1, 7)]
+
+
+def test_a_disk_that_fills_under_tensorboard_is_one_line_and_the_run_goes_on(
+    tmp_path, whole, monkeypatch, capfd
+):
+    """TensorBoard's thread prints a traceback of its own, and hands the error to a later call."""
+
+    def fails(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def fill_the_disk(row):
+        if row["iteration"] == 2:
+            monkeypatch.setattr(RecordWriter, "write", fails)
+
+    run = create(tmp_path / "full")
+    with pytest.raises(GaitshiftError, match=r"tensorboard cannot be written: No space left"):
+        run.train(fill_the_disk)
+    assert "Traceback" not in capfd.readouterr().err
+    monkeypatch.undo()
+    again = Run.resume(tmp_path / "full")
+    again.train()
+    assert same_bits(weights(again), weights(whole[0]))

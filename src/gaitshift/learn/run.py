@@ -14,7 +14,6 @@ from typing import Any
 import cattrs
 import numpy as np
 import torch
-from torch.utils.tensorboard import SummaryWriter
 
 from gaitshift import table
 from gaitshift.errors import GaitshiftError
@@ -36,6 +35,7 @@ from gaitshift.learn.run_folder import (
     is_barely_begun,
     read_config,
 )
+from gaitshift.learn.tensorboard_log import TensorBoardLog
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
@@ -175,29 +175,39 @@ class Run:
         also written every `publish_every` seconds, for those who watch.
         After Ctrl-C the last checkpoint and the present policy are on disk.
         """
-        writer = SummaryWriter(str(self.folder / "tensorboard"), purge_step=self.iteration)
         for name in (PROGRESS, VERDICTS):
             trim(self.folder / name, self.iteration)
         try:
-            if judge is not None and self._lacks_verdict():
-                self._write_verdict(judge)
-            published = time.monotonic()
-            while self.iteration < self.recipe.iterations:
-                row = self.iterate()
-                self._log(row, writer)
-                report(row)
-                self._keep_divergences(keep)
-                if self._is_checkpoint():
-                    self._save_checkpoint()
-                    if judge is not None:
-                        self._write_verdict(judge)
-                elif time.monotonic() > published + publish_every:
-                    self.export()
-                    published = time.monotonic()
+            with TensorBoardLog(self.folder / "tensorboard", self.iteration) as curves:
+                self._train(curves, report, judge, keep, publish_every)
         finally:
-            writer.close()
             self.export()
         return self.folder / POLICY
+
+    def _train(
+        self,
+        curves: TensorBoardLog,
+        report: Callable[[Row], None],
+        judge: Judge | None,
+        keep: Keep | None,
+        publish_every: float,
+    ) -> None:
+        if judge is not None and self._lacks_verdict():
+            self._write_verdict(judge)
+        published = time.monotonic()
+        while self.iteration < self.recipe.iterations:
+            row = self.iterate()
+            table.append(self.folder / PROGRESS, row)
+            curves.add(row)
+            report(row)
+            self._keep_divergences(keep)
+            if self._is_checkpoint():
+                self._save_checkpoint()
+                if judge is not None:
+                    self._write_verdict(judge)
+            elif time.monotonic() > published + publish_every:
+                self.export()
+                published = time.monotonic()
 
     def write_policy_at(self, iteration: int, path: Path) -> None:
         """Writes the policy of a checkpoint; the run itself goes back to that checkpoint.
@@ -298,12 +308,6 @@ class Run:
         drawn = within - within % stage.redraw_every
         self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed), stage.fidelity)
         self.learner.env.push_at_most(stage.push)
-
-    def _log(self, row: Row, writer: SummaryWriter) -> None:
-        table.append(self.folder / PROGRESS, row)
-        for name, value in row.items():
-            if name not in ("iteration", "stage"):
-                writer.add_scalar(name if "/" in name else f"train/{name}", value, row["iteration"])
 
     def _keep_divergences(self, keep: Keep | None) -> None:
         seen = self.learner.env.world.divergences
