@@ -149,6 +149,9 @@ class Proprioception(Moving):
     """Estimated velocity of the base origin [m/s]."""
     angular_velocity_b: Float[np.ndarray, "*batch 3"] | None = None
     """Angular velocity of the base [rad/s]."""
+    specific_force_b: Float[np.ndarray, "*batch 3"] | None = None
+    """Acceleration of the base origin less gravity, the mean over the step, as an accelerometer
+    shows it: (0, 0, 9.81) at rest on level ground [m/s²]."""
     time: Float[np.ndarray, " steps"] | float = 0.0
     """Time since the start [s]."""
     period: float = CONTROL_PERIOD
