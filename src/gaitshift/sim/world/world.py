@@ -25,6 +25,7 @@ from gaitshift.sim.world.limits import (
     check_within,
 )
 from gaitshift.sim.world.model import Fidelity, build_model
+from gaitshift.sim.world.randomisation import SAME, Models, Randomisation
 
 CONTACT_FORCE = 1.0
 """A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
@@ -55,6 +56,7 @@ class World:
         *,
         gains: str = "default",
         fidelity: Fidelity = "exact",
+        randomisation: Randomisation = SAME,
         threads: int = 0,
     ) -> None:
         """Builds the world with all robots in their stance at the origin.
@@ -65,6 +67,7 @@ class World:
             n: number of robots.
             gains: preset of joint gains in `robot.gains`.
             fidelity: of the contacts.
+            randomisation: what `redraw` draws anew.
             threads: physics threads, 0 for all cores.
         """
         if n < 1:
@@ -73,6 +76,8 @@ class World:
         self.n = n
         self._gains = robot.gains_of(gains)
         self._threads = threads
+        self._randomisation = randomisation
+        self._models: Models | None = None
         self._stance = robot.stance_angles
         self._history = History(n)
         self.divergences: list[Divergence] = []
@@ -101,7 +106,10 @@ class World:
         self.model = models[0]
         self._substeps = round(CONTROL_PERIOD / self.model.opt.timestep)
         batch = Batch(self.model, self.n, self._threads, True)
-        if len(models) > 1:
+        if self._randomisation.varies:
+            self._models = Models(models, self.n, self._randomisation, self._models)
+            batch.set_models(self._models.each)
+        elif len(models) > 1:
             batch.set_models([models[i % len(models)] for i in range(self.n)])
         self._batch = batch
         self._warned: Int[np.ndarray, "N 3"] = batch.warning[:, DIVERGED, 1]
@@ -110,6 +118,14 @@ class World:
         self._sensors, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
         if state is not None:
             self.set_state(*state)
+
+    def redraw(self, ids: Int[np.ndarray, " K"], rng: np.random.Generator) -> None:
+        """Draws what differs from robot to robot anew for these, without moving them.
+
+        Draws nothing where nothing differs.
+        """
+        if self._models is not None:
+            self._models.draw(ids, rng)
 
     def set_state(self, qpos: Float[np.ndarray, "N 19"], qvel: Float[np.ndarray, "N 18"]) -> None:
         """Puts all robots into these states; joint targets are their present angles.
