@@ -14,6 +14,7 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
 from gaitshift.shift import GaitGraph, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.terrain import Terrain, from_spec
 from gaitshift.sim.world import World
 
@@ -70,6 +71,8 @@ class DemoConfig:
     """Time between two shifts of `gaits` [s]."""
     at: tuple[float, ...] = ()
     """Times of the shifts between `gaits` [s], in place of `every`."""
+    sensors: SensorConfig = PERFECT
+    """Sensors of the robots and their link to the joints."""
     episodes: int = 1
     """Number of robots, each with its own track and start; pictures show robot 0."""
     seed: int = 0
@@ -138,7 +141,14 @@ def run_demo(
     finish = _finish(config, grounds[0])
     slowest = float(controller.repertoire.forward_speed.min())
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
-    world = World(controller.robot, grounds, n, gains=controller.gains)
+    world = World(
+        controller.robot,
+        grounds,
+        n,
+        gains=controller.gains,
+        sensors=config.sensors,
+        seed=config.seed,
+    )
     start = np.tile([START, 0.0], (n, 1))
     log = rollout(
         world,
