@@ -24,6 +24,7 @@ for N in one pass of NumPy.
 """
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -136,19 +137,18 @@ class Estimator:
             GaitshiftError: `sensed` has no joint angles, angular velocity or specific force.
         """
         mean, covariance = self._predicted(state, sensed)
-        measured, noise = sensed.foot_position_b, self.config.foot**2
-        # One axis of the covariance is enough for each foot: it is the same for all three.
-        feet = covariance.reshape(-1, 25)[:, 6::6]
+        measured, noise = sensed.foot_position_b, self._noise[0, 0]
+        variance = covariance.reshape(-1, 25)[:, 6::6]  # of the feet; a view
         error = measured - mean[:, 1:]
-        distance = (error * error).sum(axis=2) / (feet + noise)
+        distance = np.einsum("nij,nij->ni", error, error) / (variance + noise)
         stands = sensed.contact & state.contact & (distance < self.config.gate)
         mean[:, 1:] = np.where(stands[:, :, None], mean[:, 1:], measured)
         known = np.ones((len(stands), 5))
         known[:, 1:] = stands
         covariance *= known[:, :, None] * known[:, None]
-        feet += np.where(stands, 0.0, _UNKNOWN**2)
+        variance += np.where(stands, 0.0, _UNKNOWN**2)
         across = covariance[:, :, 1:]
-        gain = across @ np.linalg.inv(across[:, 1:] + noise * np.eye(4))
+        gain = across @ np.linalg.inv(across[:, 1:] + self._noise)
         mean += gain @ (measured - mean[:, 1:])
         covariance -= gain @ covariance[:, 1:]
         after = EstimatorState(
@@ -160,6 +160,11 @@ class Estimator:
             joint_position=sensed.need("joint_position", "the estimator"),
         )
         return after, replace(sensed, velocity_b=after.velocity_b)
+
+    @cached_property
+    def _noise(self) -> Float[np.ndarray, "4 4"]:
+        """Covariance of the measured feet along any one axis [m²]."""
+        return self.config.foot**2 * np.eye(4)
 
     def _predicted(
         self, state: EstimatorState, sensed: Proprioception
@@ -180,13 +185,15 @@ class Estimator:
         mean[:, 0] += period * acceleration
         travel = period * (mean[:, 0] - (0.5 * period) * acceleration)
         mean[:, 1:] += self._rolled(state.joint_position, joints, turn, up) - travel[:, None]
-        covariance = state.covariance.copy()
-        covariance[:, 1:] -= period * covariance[:, :1]
-        covariance[:, :, 1:] -= period * covariance[:, :, :1]
-        diagonal = covariance.reshape(n, 25)[:, ::6]
-        diagonal[:, 0] += (self.config.acceleration * period) ** 2
-        diagonal[:, 1:] += (self.config.slip * period) ** 2
+        transition = np.eye(5)
+        transition[1:, 0] = -period
+        covariance = transition @ state.covariance @ transition.T + period**2 * self._drive
         return mean, covariance
+
+    @cached_property
+    def _drive(self) -> Float[np.ndarray, "5 5"]:
+        """Covariance of what drives base [m²/s⁴] and feet [m²/s²], constant over a step."""
+        return np.diag([self.config.acceleration**2, *[self.config.slip**2] * 4])
 
     def _rolled(
         self,
