@@ -1,6 +1,7 @@
 """Rollouts of robots that measure no velocity: who sees the estimate, and how good it is."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,10 +10,12 @@ from gaitshift.control import Driver, Estimator, policy
 from gaitshift.lab.evaluation import RolloutConfig, rollout
 from gaitshift.lab.evaluation.rollout import Walk
 from gaitshift.robot.description import ANYMAL_B
+from gaitshift.robot.robot_file import read_robot
 from gaitshift.sim.terrain import flat, from_spec
 from gaitshift.sim.world import World
 from unmeasured import Unmeasured
 
+PONY = Path(__file__).parents[2] / "examples" / "robots" / "pony.toml"
 LEVEL = flat(40.0, 12.0).moved(-2.0, 0.0)
 NOISE = {"gyro": 0.03, "accelerometer": 0.15}
 """[rad/s, m/s²]"""
@@ -102,6 +105,22 @@ def test_a_robot_that_is_set_down_again_is_estimated_anew():
         run.step()
     error = run.sensed.velocity_b - run.world.truth.velocity_b
     assert np.abs(error).max() < 0.3
+
+
+def test_a_robot_of_another_size_is_estimated_as_well():
+    """Ponies that stagger at up to 0.5 m/s: within 0.02 m/s (root mean square)."""
+    pony = read_robot(PONY)
+    world, estimator = Unmeasured(LEVEL, 8, robot=pony), Estimator(robot=pony)
+    world.place(np.arange(8), xy=np.zeros((8, 2)), yaw=np.linspace(-3.0, 3.0, 8))
+    state, errors = estimator.begin(8), []
+    phase = np.random.default_rng(0).uniform(-3.0, 3.0, (8, 12))
+    for step in range(300):
+        swing = 0.1 * np.sin(4.0 * np.pi * 0.01 * step + phase)
+        sensed, truth = world.step(pony.stance_angles + swing)
+        state, _ = estimator.step(state, sensed)
+        errors.append(state.velocity_b - truth.velocity_b)
+    assert np.sqrt(np.square(errors[100:]).mean()) < 0.02
+    assert not truth.body_contact.any()
 
 
 @pytest.mark.learned
