@@ -7,9 +7,10 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.control import Controller, Switcher
+from gaitshift.control import Controller, Estimator, Switcher
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
+from gaitshift.robot.state import Proprioception
 from gaitshift.shift import Decision
 from gaitshift.sim.world import PushConfig, Pusher, World
 
@@ -46,7 +47,11 @@ OVER_THE_EDGE = 0.5
 
 
 class Walk:
-    """N robots that walk along x, one control step at a time."""
+    """N robots that walk along x, one control step at a time.
+
+    Where the world senses a specific force and no velocity, the controller and the switcher see the
+    velocity that an `Estimator` computes.
+    """
 
     def __init__(
         self,
@@ -76,8 +81,11 @@ class Walk:
         """The switcher's decision in the last step."""
         self.wanted = self._command()
         """The command in the last step, before the speed loop's trim."""
-        self.sensed = world.sensed
+        self._estimator = Estimator(robot=controller.robot)
+        self._estimate = self._estimator.begin(n)
+        self.sensed = self._with_velocity(world.sensed)
         """Proprioception in the last step, with the time and the command."""
+        self._seen = self.sensed
         self._asked = self.wanted
         self._speed_state = config.speed_loop.start(n)
 
@@ -96,10 +104,14 @@ class Walk:
         `force_w` [N] acts on the bases in addition to the pushes of the config.
         """
         world, controller = self.world, self.controller
-        target = controller.act(world.sensed, self._asked)
+        target = controller.act(self._seen, self._asked)
         target[self.fallen] = self._stance
         world.push(self._pusher.step() + force_w)
         sensed, truth = world.step(target)
+        if truth.diverged.any():  # and is set down again
+            ids = np.flatnonzero(truth.diverged)
+            self._estimate = self._estimate.with_robots(ids, self._estimator.begin(len(ids)))
+        self._seen = sensed = self._with_velocity(sensed)
         self.steps += 1
         is_off = (truth.clearance < -OVER_THE_EDGE).all(axis=1)
         self.fallen = self.fallen | truth.body_contact | truth.diverged | is_off
@@ -120,6 +132,13 @@ class Walk:
             self._speed_state, self.wanted.forward_speed, sensed.forward_speed
         )
         self._asked = replace(self.wanted, forward_speed=asked)
+
+    def _with_velocity(self, sensed: Proprioception) -> Proprioception:
+        """What is sensed, with the estimated velocity where none is sensed but could be."""
+        if sensed.velocity_b is not None or sensed.specific_force_b is None:
+            return sensed
+        self._estimate, sensed = self._estimator.step(self._estimate, sensed)
+        return sensed
 
     def _command(self) -> Command:
         config, controller, n = self.config, self.controller, self.controller.n
