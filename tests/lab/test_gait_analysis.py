@@ -131,7 +131,7 @@ def test_clearance_is_the_median_of_the_highest_point_of_each_stride():
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
     stride = np.arange(1200) // 40
     log.truth.clearance[30::40, 0, 0] = np.array([0.02, 0.04, 0.09])[stride[30::40] % 3]
-    log.sensed.contact[10:1200:40, 0, 0] = False
+    log.truth.foot_force[10:1200:40, 0, 0] = 0.0
     figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["clearance"][0] == pytest.approx(0.04)
     assert figures["touchdowns_per_cycle"][0] == pytest.approx(2.0)

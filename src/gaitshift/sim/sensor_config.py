@@ -11,10 +11,7 @@ from dataclasses import dataclass, replace
 from gaitshift.data import check_ranges, known_names
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
-
-CONTACT_FORCE = 1.0
-"""A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
-value of legged_gym."""
+from gaitshift.robot.state import CONTACT_FORCE
 
 MOST_DELAY = 0.1
 """Longest delay and jitter [s]; ours: ten control steps, and far below the shortest stride of a

@@ -213,7 +213,7 @@ def step_of(walk: Walk) -> Log:
         threshold=nothing if decision is None else decision.threshold,
         gait=controller.gait.copy(),
         machine_state=controller.machine_state.copy(),
-        stance_shown=controller.repertoire.stance_shown(controller.gait, walk.sensed.contact),
+        stance_shown=controller.repertoire.stance_shown(controller.gait, world.truth.foot_contact),
         fallen=walk.fallen.copy(),
         gaits=controller.repertoire.gaits,
         robot=controller.robot.name,

@@ -14,7 +14,7 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.latency import Latency
-from gaitshift.sim.sensor_config import CONTACT_FORCE, PERFECT, SensorConfig
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.sensors import POSE, TWIST, Sensors, sense
 from gaitshift.sim.terrain import Fields, Terrain
 from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
@@ -290,7 +290,7 @@ class World:
             qpos,
             qvel,
             self._torque.copy(),
-            contact=force > CONTACT_FORCE,
+            contact=self.truth.foot_contact,
             mass=self.robot.mass,
         )
 
