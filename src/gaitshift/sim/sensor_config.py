@@ -137,8 +137,8 @@ ANYMAL = SensorConfig(
     accelerometer_noise=0.05,
     # 0.2° of static roll and pitch (Xsens MTi user manual MT0605P, 4.3) times g.
     accelerometer_bias=0.034,
-    # Ours: in a trot roll then has errors of 0.2° RMS and pitch of 0.5°; Xsens states 0.5° (MTi-20
-    # in motion, MT0605P, 4.3), and PX4's filter has 5 s (ATT_W_ACC 0.2).
+    # Ours: the vertical then has an error of 0.6° to 0.7° RMS in a trot; Xsens states 0.5° each for
+    # roll and pitch (MTi-20 in motion, MT0605P, 4.3), and PX4's filter has 5 s (ATT_W_ACC 0.2).
     attitude_time=4.0,
     # Ours, for force sensors in the feet: 3 % of the weight, and one step of a hundred wrong.
     contact_threshold=10.0,
@@ -172,7 +172,7 @@ CHEAP = SensorConfig(
     accelerometer_noise=0.2,
     # Ours: 10 mg are left of ± 50 mg on a board (ICM-20948) after calibration: 0.6° of tilt.
     accelerometer_bias=0.1,
-    # Ours: shorter than above, because the gyro drifts more; 0.7° and 0.9° RMS in a trot.
+    # Ours: shorter than above, because the gyro drifts more; 1.1° to 1.2° RMS in a trot.
     attitude_time=2.0,
     # Ours, for contacts by motor currents: 7 % of the weight, and twice to four times the errors of
     # Bledt et al. 2018, whose fusion with the gait's phase is right in 99.3 % of all steps.
