@@ -130,7 +130,9 @@ class Evaluate(RobotOption, EvaluationConfig):
 
     def _try(self, loaded: policies.Policy, size: Literal["all", "short", "quick"]) -> Judged:
         with progress(f"trials of {loaded.gait}") as report:
-            rows, figures, log = run_trials(loaded, SIZES[size], self.seed, report)
+            rows, figures, log = run_trials(
+                loaded, SIZES[size], self.seed, report, simulator=self.simulator
+            )
         if self.json:
             emit_json(
                 {
@@ -138,6 +140,7 @@ class Evaluate(RobotOption, EvaluationConfig):
                     "gait": loaded.gait,
                     "size": {"name": size, **asdict(SIZES[size])},
                     "seed": self.seed,
+                    "simulator": self.simulator,
                     "trials": [row.to_dict() for row in rows],
                     "figures": figures,
                 }
@@ -181,7 +184,8 @@ class Evaluate(RobotOption, EvaluationConfig):
         if self.commands and (self.trials or self.log or self.plot):
             raise GaitshiftError("--commands must not be given with --trials, --log or --plot")
         for field in fields(EvaluationConfig):
-            if field.name != "seed" and getattr(self, field.name) != field.default:
+            is_free = field.name == "seed" or (self.trials and field.name == "simulator")
+            if not is_free and getattr(self, field.name) != field.default:
                 option = field.name.replace("_", "-")
                 raise GaitshiftError(f"--{option} must not be given with {mode}, which sets it")
 

@@ -14,8 +14,8 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
 from gaitshift.shift import GaitGraph, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
+from gaitshift.sim.simulator import SimulatorName, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
-from gaitshift.sim.world import World
 
 RUN_OUT = 8.0
 """Metres of level ground behind the finish, where faster robots wait for slower ones."""
@@ -74,6 +74,9 @@ class DemoConfig:
     """Number of robots, each with its own track and start; pictures show robot 0."""
     seed: int = 0
     """Seed of the track and start of robot 0; robot i uses seed + i."""
+    simulator: SimulatorName = "mujoco"
+    """What simulates the robots: `mujoco`, in which policies are trained, or `pybullet`, with
+    contacts of its own and ANYmal B's public URDF (extra `sim2sim`)."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 1000:
@@ -138,7 +141,8 @@ def run_demo(
     finish = _finish(config, grounds[0])
     slowest = float(controller.repertoire.forward_speed.min())
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
-    world = World(controller.robot, grounds, n, gains=controller.gains)
+    make_world = simulator_maker(config.simulator)
+    world = make_world(controller.robot, grounds, n, gains=controller.gains)
     start = np.tile([START, 0.0], (n, 1))
     log = rollout(
         world,

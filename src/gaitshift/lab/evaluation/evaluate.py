@@ -15,8 +15,9 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
+from gaitshift.sim.push import PushConfig
+from gaitshift.sim.simulator import SimulatorName, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
-from gaitshift.sim.world import PushConfig, World
 
 FIELDS = 8
 """Number of different grounds among which robots are divided where the ground is random."""
@@ -53,6 +54,9 @@ class EvaluationConfig:
     """Largest push on the base [N]; a push lasts 0.2 s and comes every 2 s."""
     seed: int = 0
     """Seed of terrains, starts and pushes."""
+    simulator: SimulatorName = "mujoco"
+    """What simulates the robots: `mujoco`, in which policies are trained, or `pybullet`, with
+    contacts of its own and ANYmal B's public URDF (extra `sim2sim`)."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 100_000:
@@ -132,7 +136,8 @@ def run_controller(
     own = float(controller.repertoire.own_command(controller.gait).forward_speed.max())
     speed = own if config.speed is None else config.speed
     grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
-    world = World(controller.robot, grounds, controller.n, gains=controller.gains)
+    make = simulator_maker(config.simulator)
+    world = make(controller.robot, grounds, controller.n, gains=controller.gains)
     start = starts(controller, rng)
     return rollout(
         world, controller, run, start_xy=start, rng=rng, finish_x=finish_x, report=report

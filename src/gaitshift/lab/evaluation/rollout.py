@@ -11,7 +11,8 @@ from gaitshift.control import Controller, Switcher
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
 from gaitshift.shift import Decision
-from gaitshift.sim.world import PushConfig, Pusher, World
+from gaitshift.sim.push import PushConfig, Pusher
+from gaitshift.sim.simulator import Simulator
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +51,7 @@ class Walk:
 
     def __init__(
         self,
-        world: World,
+        world: Simulator,
         controller: Controller,
         config: RolloutConfig,
         *,
@@ -134,7 +135,7 @@ class Walk:
 
 
 def rollout(
-    world: World,
+    world: Simulator,
     controller: Controller,
     config: RolloutConfig,
     *,

@@ -20,6 +20,7 @@ from gaitshift.lab.evaluation.evaluate import (
 from gaitshift.lab.gait_analysis import Check, checks
 from gaitshift.lab.gait_analysis.verdict import FIRST, limits_of
 from gaitshift.lab.log import Log
+from gaitshift.sim.simulator import SimulatorName
 
 BATCH = 1_000_000
 """Largest number of control steps of all robots in a batch: its log takes about 330 MB."""
@@ -142,13 +143,17 @@ def run_trials(
     size: Size,
     seed: int = 0,
     report: Report = lambda done, total: None,
+    *,
+    simulator: SimulatorName = "mujoco",
 ) -> tuple[list[Row], dict[str, Any], Log]:
     """All trials of a policy: the table, the figures of its gait on flat ground, and that log.
 
     `report` is called with the number of control steps done, of all robots, and the total.
     """
-    gait = EvaluationConfig(episodes=size.episodes, seconds=size.seconds, seed=seed)
-    plan = [list(_batches(trial, policy, size, seed)) for trial in TRIALS]
+    gait = EvaluationConfig(
+        episodes=size.episodes, seconds=size.seconds, seed=seed, simulator=simulator
+    )
+    plan = [list(_batches(trial, policy, size, seed, simulator)) for trial in TRIALS]
     total = sum(_cost(config) for config in (gait, *(c for configs in plan for c in configs)))
     done = 0
 
@@ -175,7 +180,9 @@ def run_trials(
     return rows, figures, log
 
 
-def _batches(trial: Trial, policy: Policy, size: Size, seed: int) -> Iterator[EvaluationConfig]:
+def _batches(
+    trial: Trial, policy: Policy, size: Size, seed: int, simulator: SimulatorName
+) -> Iterator[EvaluationConfig]:
     """The runs of a trial, each with its own seed and so its own grounds."""
     speed, seconds = policy.info.forward_speed, size.seconds
     if trial.figure == "lateral_error_p95":
@@ -189,6 +196,7 @@ def _batches(trial: Trial, policy: Policy, size: Size, seed: int) -> Iterator[Ev
             seconds=seconds,
             push=trial.push,
             seed=seed,
+            simulator=simulator,
         )
         left, seed = left - most, seed + 1
 

@@ -13,10 +13,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
-from gaitshift.sim.sensors import POSE, TWIST, sense
-from gaitshift.sim.terrain import Fields, Terrain
-from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
-from gaitshift.sim.world.limits import (
+from gaitshift.sim.limits import (
+    FASTEST,
     MOST_ANGLE,
     MOST_DISTANCE,
     MOST_FORCE,
@@ -24,11 +22,11 @@ from gaitshift.sim.world.limits import (
     check_unit,
     check_within,
 )
+from gaitshift.sim.sensors import POSE, TWIST, sense
+from gaitshift.sim.simulator import CONTACT_FORCE
+from gaitshift.sim.terrain import Fields, Terrain
+from gaitshift.sim.world.divergence import DIVERGED, MOST_KEPT, Divergence, History
 from gaitshift.sim.world.model import Fidelity, build_model
-
-CONTACT_FORCE = 1.0
-"""A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
-value of legged_gym."""
 
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are posed before they are set on the ground [m]; ours."""
