@@ -10,10 +10,6 @@ from gaitshift.errors import GaitshiftError
 MOST_ANGLE = 20.0
 """Greatest joint angle or joint target [rad]; ours: three turns, more than any joint has."""
 
-FASTEST = 1000.0
-"""Greatest velocity of a base or joint [m/s, rad/s]; ours: ten times what full torque gives a free
-shank, and far below MuJoCo's own limit, so that no later step starts from such a state."""
-
 MOST_FORCE = 10_000.0
 """Greatest force on a base [N]; ours: ten times the hardest push of `PushConfig`."""
 

@@ -67,15 +67,15 @@ class Body:
             raise GaitshiftError(f"the simulator 'pybullet' is not installed: {EXTRA}")
         self._bullet: Any = import_module("pybullet")
         bullet = self._bullet
-        self._client = client = int(bullet.connect(bullet.DIRECT))
+        self.client = client = int(bullet.connect(bullet.DIRECT))
+        """Its number."""
         if client < 0:
             raise GaitshiftError("PyBullet gives no further client; run fewer robots at once")
         weakref.finalize(self, bullet.disconnect, physicsClientId=client)
         bullet.setTimeStep(PHYSICS_STEP, physicsClientId=client)
         bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
         bullet.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=client)
-        self.ground = add_ground(bullet, client, terrain)
-        """Number of the ground's body."""
+        add_ground(bullet, client, terrain)
         flags = bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_IGNORE_VISUAL_SHAPES
         with _quiet():  # it names the base link, whose inertia is not physical, on stdout
             self._robot = bullet.loadURDF(str(urdf), flags=flags, physicsClientId=client)
@@ -86,7 +86,7 @@ class Body:
     def _name_links(self) -> None:
         """Finds joints and feet in the package's order."""
         infos = [
-            self._bullet.getJointInfo(self._robot, joint, physicsClientId=self._client)
+            self._bullet.getJointInfo(self._robot, joint, physicsClientId=self.client)
             for joint in range(self._bullet.getNumJoints(**self._of_robot))
         ]
         joints = {info[1].decode(): int(info[0]) for info in infos}
@@ -97,7 +97,7 @@ class Body:
         self._trunk = {-1} | {links[name] for name in _TRUNK if name in links}
         self._links = [-1, *links.values()]
         shapes = [
-            self._bullet.getCollisionShapeData(self._robot, foot, physicsClientId=self._client)
+            self._bullet.getCollisionShapeData(self._robot, foot, physicsClientId=self.client)
             for foot in self._feet
         ]
         self._spheres = np.array([shape[0][5] for shape in shapes])
@@ -133,7 +133,7 @@ class Body:
             ornObj=motion.quaternion.tolist(),
             **self._of_robot,
         )
-        robot, client = self._robot, self._client
+        robot, client = self._robot, self.client
         self._bullet.resetBaseVelocity(
             robot,
             motion.velocity_w.tolist(),
@@ -162,9 +162,9 @@ class Body:
                 force_w.tolist(),
                 self.motion().position_w.tolist(),
                 self._bullet.WORLD_FRAME,
-                physicsClientId=self._client,
+                physicsClientId=self.client,
             )
-        self._bullet.stepSimulation(physicsClientId=self._client)
+        self._bullet.stepSimulation(physicsClientId=self.client)
 
     def joints(self) -> Float[np.ndarray, "2 12"]:
         """Joint angles [rad] and velocities [rad/s]."""
@@ -197,7 +197,7 @@ class Body:
         PyBullet also lists points without force, which touch nothing.
         """
         force = dict.fromkeys(self._links, 0.0)
-        points = self._bullet.getContactPoints(bodyA=self._robot, physicsClientId=self._client)
+        points = self._bullet.getContactPoints(bodyA=self._robot, physicsClientId=self.client)
         for point in points:
             force[point[3]] += point[9]
         on_feet = np.array([force[foot] for foot in self._feet])

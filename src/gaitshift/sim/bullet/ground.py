@@ -5,19 +5,17 @@ from typing import Any
 from gaitshift.sim.terrain import Terrain
 
 
-def add_ground(bullet: Any, client: int, terrain: Terrain) -> int:
-    """Adds the terrain to a client, with a friction of 1, and returns the number of its body.
+def add_ground(bullet: Any, client: int, terrain: Terrain) -> None:
+    """Adds the terrain to a client, with a friction of 1.
 
     PyBullet multiplies the frictions of two bodies, so that 1 leaves the robot's.
     """
-    shape, position, turn = _plane(bullet, client, terrain)
-    if not terrain.is_flat:
-        shape, position, turn = _field(bullet, client, terrain)
+    make = _plane if terrain.is_flat else _field
+    shape, position, turn = make(bullet, client, terrain)
     body = bullet.createMultiBody(
         0.0, shape, basePosition=position, baseOrientation=turn, physicsClientId=client
     )
     bullet.changeDynamics(body, -1, lateralFriction=1.0, physicsClientId=client)
-    return int(body)
 
 
 Placed = tuple[int, tuple[float, float, float], tuple[float, float, float, float]]

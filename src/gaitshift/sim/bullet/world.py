@@ -14,7 +14,6 @@ from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turne
 from gaitshift.robot.urdf import urdf_of
 from gaitshift.sim.bullet.body import EXTRA, PHYSICS_STEP, Body, Motion
 from gaitshift.sim.limits import (
-    FASTEST,
     MOST_ANGLE,
     MOST_DISTANCE,
     MOST_FORCE,
@@ -24,6 +23,9 @@ from gaitshift.sim.limits import (
 from gaitshift.sim.sensors import POSE, TWIST, sense
 from gaitshift.sim.simulator import CONTACT_FORCE
 from gaitshift.sim.terrain import Fields, Terrain
+
+FASTEST = 99.0
+"""Greatest velocity of a base or joint [m/s, rad/s]; PyBullet itself holds them below 100."""
 
 MOST_ROBOTS = 256
 """Most robots of a world; ours: each has a client of its own, which takes 45 MB."""

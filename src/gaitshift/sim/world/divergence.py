@@ -14,6 +14,10 @@ DIVERGED = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mj
 """MuJoCo's warnings of positions, velocities and accelerations that are not finite or above 1e10,
 after which it resets a robot."""
 
+FASTEST = 1000.0
+"""Greatest velocity of a base or joint [m/s, rad/s]; ours: ten times what full torque gives a free
+shank, and far below MuJoCo's own limit, so that no later step starts from such a state."""
+
 MOST_KEPT = 8
 """Most divergences that are kept and logged; ours: enough to see a cause, 15 kB each."""
 

@@ -14,7 +14,6 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.limits import (
-    FASTEST,
     MOST_ANGLE,
     MOST_DISTANCE,
     MOST_FORCE,
@@ -25,7 +24,7 @@ from gaitshift.sim.limits import (
 from gaitshift.sim.sensors import POSE, TWIST, sense
 from gaitshift.sim.simulator import CONTACT_FORCE
 from gaitshift.sim.terrain import Fields, Terrain
-from gaitshift.sim.world.divergence import DIVERGED, MOST_KEPT, Divergence, History
+from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
 from gaitshift.sim.world.model import Fidelity, build_model
 
 CLEAR_OF_GROUND = 20.0
