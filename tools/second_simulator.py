@@ -27,7 +27,7 @@ RESULTS = Path(__file__).parent.parent / "docs" / "results"
 PAGE = RESULTS / "second-simulator.md"
 GAITS, SHIFTS = RESULTS / "second_simulator_gaits.csv", RESULTS / "second_simulator_shifts.csv"
 
-ROBOTS, SECONDS, CROSSINGS = 16, 10.0, 20
+ROBOTS, SECONDS, CROSSINGS = 8, 10.0, 20
 NOISE_AT = 8.0
 """Where the noise begins on the demonstration's track [m]."""
 
@@ -65,7 +65,7 @@ each on a field of its own, the same in both.
 
 {results}
 This page is made by `python tools/second_simulator.py`. One gait alone: `gaitshift evaluate trot
---simulator pybullet --episodes 16`.
+--simulator pybullet --episodes 8`.
 """
 
 
