@@ -1,5 +1,6 @@
 """The second simulator: against mechanics, and against MuJoCo where both have to agree."""
 
+import json
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -7,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from gaitshift.cli import main
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.robot.urdf import urdf_of
@@ -315,3 +317,16 @@ def test_values_out_of_range_are_refused_and_nothing_moves():
 def test_too_many_robots_are_refused():
     with pytest.raises(GaitshiftError, match="257"):
         BulletWorld(ANYMAL_B, LEVEL, 257)
+
+
+@pytest.mark.learned
+def test_a_shipped_trot_is_a_clean_trot_here_as_well_and_stdout_holds_its_figures_alone(capfd):
+    """At fd level, because PyBullet writes to C's stdout."""
+    command = ["evaluate", "trot", "--simulator", "pybullet", "--episodes", "2", "--seconds", "4"]
+    main([*command, "--json"])
+    figures = json.loads(capfd.readouterr().out)
+    assert figures["simulator"] == "pybullet"
+    assert figures["verdict"]["gait"] == "trot"
+    assert figures["verdict"]["clean"]
+    assert figures["survival"] == 1.0
+    assert figures["speed_mean"] == pytest.approx(1.2, abs=0.06)
