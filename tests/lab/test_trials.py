@@ -77,9 +77,10 @@ def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
 def test_batches_have_all_robots_and_seeds_of_their_own(walk_file, monkeypatch):
     monkeypatch.setattr(trials_module, "BATCH", 16 * 30)
     size = replace(TINY, pushed=40)
-    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), size, 5))
+    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), size, 5, "pybullet"))
     assert [config.episodes for config in configs] == [16, 16, 8]
     assert [config.seed for config in configs] == [5, 6, 7]
+    assert {config.simulator for config in configs} == {"pybullet"}
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: trial.terrain)
@@ -158,7 +159,7 @@ def test_evaluate_prints_one_object_and_draws(walk_file, tmp_path, capsys):
 
 
 def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys, monkeypatch):
-    monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_: tried[0])
+    monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_, **__: tried[0])
     main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
     said = json.loads(capsys.readouterr().out)
     assert len(said["trials"]) == len(TRIALS) + GROUNDS + 7
