@@ -1,6 +1,7 @@
 """The interface of simulators, what they all have in common, and simulators by name."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pkgutil import resolve_name
 from typing import Literal, Protocol, runtime_checkable
 
@@ -82,8 +83,17 @@ class SimulatorMaker(Protocol):
 
 
 SimulatorName = Literal["mujoco", "pybullet"]
-"""What simulates the robots: `mujoco`, in which policies are trained, or `pybullet`, with contacts
-of its own, on ANYmal B's public URDF (extra `sim2sim`)."""
+"""Names of simulators."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatorChoice:
+    """For settings of runs that either simulator can do."""
+
+    simulator: SimulatorName = "mujoco"
+    """What simulates the robots: `mujoco`, in which policies are trained, or `pybullet`, with
+    contacts of its own and ANYmal B's public URDF (extra `sim2sim`)."""
+
 
 SIMULATORS: dict[str, str] = {
     "mujoco": "gaitshift.sim.world:World",

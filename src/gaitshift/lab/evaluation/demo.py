@@ -14,7 +14,7 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
 from gaitshift.shift import GaitGraph, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
-from gaitshift.sim.simulator import SimulatorName, simulator_maker
+from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
 
 RUN_OUT = 8.0
@@ -35,7 +35,7 @@ _NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
 
 
 @dataclass(frozen=True, kw_only=True)
-class DemoConfig:
+class DemoConfig(SimulatorChoice):
     """Settings of the demonstration."""
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
@@ -74,9 +74,6 @@ class DemoConfig:
     """Number of robots, each with its own track and start; pictures show robot 0."""
     seed: int = 0
     """Seed of the track and start of robot 0; robot i uses seed + i."""
-    simulator: SimulatorName = "mujoco"
-    """What simulates the robots: `mujoco`, in which policies are trained, or `pybullet`, with
-    contacts of its own and ANYmal B's public URDF (extra `sim2sim`)."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 1000:

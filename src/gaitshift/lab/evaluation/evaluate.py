@@ -16,7 +16,7 @@ from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
 from gaitshift.sim.push import PushConfig
-from gaitshift.sim.simulator import SimulatorName, simulator_maker
+from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
 
 FIELDS = 8
@@ -34,7 +34,7 @@ down a slope of 10° shipped policies walk 11 % further than commanded."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationConfig:
+class EvaluationConfig(SimulatorChoice):
     """Settings of an evaluation."""
 
     terrain: str = "flat"
@@ -54,9 +54,6 @@ class EvaluationConfig:
     """Largest push on the base [N]; a push lasts 0.2 s and comes every 2 s."""
     seed: int = 0
     """Seed of terrains, starts and pushes."""
-    simulator: SimulatorName = "mujoco"
-    """What simulates the robots: `mujoco`, in which policies are trained, or `pybullet`, with
-    contacts of its own and ANYmal B's public URDF (extra `sim2sim`)."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 100_000:
