@@ -2,7 +2,7 @@
 
 Usage: python tools/second_simulator.py [--page]
 
-Needs the extra `sim2sim`. Takes about half an hour on two cores. Each outcome is a row of
+Needs the extra `sim2sim`. Takes about ten minutes on two idle cores. Each outcome is a row of
 second_simulator_gaits.csv or second_simulator_shifts.csv beside the page, and runs that have a row
 there are not repeated. `--page` runs nothing and writes the page from these rows.
 """
@@ -67,9 +67,10 @@ With 8 robots the limits of a clean gait are met or missed by chance where a gai
 pace and three-one are with their touchdowns; with 256 robots all eight are clean in MuJoCo.
 
 {results}
-One of the eight robots of `three_one` in PyBullet stands on four feet from its start on, in state 0
-of the machine, and never steps; the other seven walk at 0.80 m/s. In MuJoCo 1 of 32 and 0 of 128
-robots did so in a pilot.
+What slows `three_one` and `gallop` in PyBullet is one robot of the eight that does not walk: of
+`three_one` it stands on four feet in state 0 of the machine and never steps. The other seven walk
+at the speed that they have in MuJoCo, where 1 of 32 and 0 of 128 robots of `three_one` stood in a
+pilot.
 
 This page is made by `python tools/second_simulator.py`. One gait alone: `gaitshift evaluate trot
 --simulator pybullet --episodes 8`.
