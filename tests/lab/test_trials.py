@@ -10,7 +10,7 @@ import torch
 from gaitshift.cli import main
 from gaitshift.control import policy
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import SIZES, run_trials
+from gaitshift.lab.evaluation import SIZES, EvaluationConfig, run_trials
 from gaitshift.lab.evaluation import commands as commands_module
 from gaitshift.lab.evaluation import trials as trials_module
 from gaitshift.lab.evaluation.evaluate import field_length, grounds_of
@@ -78,10 +78,12 @@ def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
 def test_batches_have_all_robots_and_seeds_of_their_own(walk_file, monkeypatch):
     monkeypatch.setattr(trials_module, "BATCH", 16 * 30)
     size = replace(TINY, pushed=40)
-    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), size, CHEAP, 5))
+    run = EvaluationConfig(seconds=size.seconds, sensors=CHEAP, seed=5, simulator="pybullet")
+    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), run, size))
     assert all(config.sensors == CHEAP for config in configs)
     assert [config.episodes for config in configs] == [16, 16, 8]
     assert [config.seed for config in configs] == [5, 6, 7]
+    assert {config.simulator for config in configs} == {"pybullet"}
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: trial.terrain)

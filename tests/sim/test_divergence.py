@@ -8,7 +8,8 @@ import pytest
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import EvaluationConfig, divergence_log, evaluate
+from gaitshift.lab.evaluation import EvaluationConfig, evaluate
+from gaitshift.lab.evaluation.divergence import divergence_log
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.show.report import write_report
 from gaitshift.sim.env import GaitEnv

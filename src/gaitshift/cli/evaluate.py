@@ -131,7 +131,12 @@ class Evaluate(RobotOption, SensorOption, EvaluationConfig):
     def _try(self, loaded: policies.Policy, size: Literal["all", "short", "quick"]) -> Judged:
         with progress(f"trials of {loaded.gait}") as report:
             rows, figures, log = run_trials(
-                loaded, SIZES[size], self.seed, report, sensors=self.sensors
+                loaded,
+                SIZES[size],
+                self.seed,
+                report,
+                sensors=self.sensors,
+                simulator=self.simulator,
             )
         if self.json:
             emit_json(
@@ -141,6 +146,7 @@ class Evaluate(RobotOption, SensorOption, EvaluationConfig):
                     "size": {"name": size, **asdict(SIZES[size])},
                     "sensors": self.sensors.name,
                     "seed": self.seed,
+                    "simulator": self.simulator,
                     "trials": [row.to_dict() for row in rows],
                     "figures": figures,
                 }
@@ -191,7 +197,10 @@ class Evaluate(RobotOption, SensorOption, EvaluationConfig):
         if self.commands and (self.trials or self.log or self.plot):
             raise GaitshiftError("--commands must not be given with --trials, --log or --plot")
         for field in fields(EvaluationConfig):
-            if field.name not in ("sensors", "seed") and getattr(self, field.name) != field.default:
+            is_free = field.name in ("sensors", "seed") or (
+                self.trials and field.name == "simulator"
+            )
+            if not is_free and getattr(self, field.name) != field.default:
                 option = field.name.replace("_", "-")
                 raise GaitshiftError(f"--{option} must not be given with {mode}, which sets it")
 

@@ -15,8 +15,8 @@ from gaitshift.lab.log import Log
 from gaitshift.shift import GaitGraph, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
-from gaitshift.sim.world import World
 
 RUN_OUT = 8.0
 """Metres of level ground behind the finish, where faster robots wait for slower ones."""
@@ -36,7 +36,7 @@ _NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
 
 
 @dataclass(frozen=True, kw_only=True)
-class DemoConfig:
+class DemoConfig(SimulatorChoice):
     """Settings of the demonstration."""
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
@@ -141,7 +141,8 @@ def run_demo(
     finish = _finish(config, grounds[0])
     slowest = float(controller.repertoire.forward_speed.min())
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
-    world = World(
+    make_world = simulator_maker(config.simulator)
+    world = make_world(
         controller.robot,
         grounds,
         n,

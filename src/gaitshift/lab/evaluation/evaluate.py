@@ -15,9 +15,10 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
+from gaitshift.sim.push import PushConfig
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
-from gaitshift.sim.world import PushConfig, World
 
 FIELDS = 8
 """Number of different grounds among which robots are divided where the ground is random."""
@@ -34,7 +35,7 @@ down a slope of 10° shipped policies walk 11 % further than commanded."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationConfig:
+class EvaluationConfig(SimulatorChoice):
     """Settings of an evaluation."""
 
     terrain: str = "flat"
@@ -135,7 +136,8 @@ def run_controller(
     own = float(controller.repertoire.own_command(controller.gait).forward_speed.max())
     speed = own if config.speed is None else config.speed
     grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
-    world = World(
+    make = simulator_maker(config.simulator)
+    world = make(
         controller.robot,
         grounds,
         controller.n,

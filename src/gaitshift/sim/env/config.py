@@ -6,8 +6,9 @@ from gaitshift.control.observation import DEFAULT_SLICES, PAPER_SLICES, check_sl
 from gaitshift.data import check_ranges
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
+from gaitshift.sim.push import PushConfig
 from gaitshift.sim.reward import RewardConfig
-from gaitshift.sim.world import PushConfig, Randomisation
+from gaitshift.sim.world import Randomisation
 
 
 @dataclass(frozen=True, kw_only=True)

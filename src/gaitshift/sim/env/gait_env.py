@@ -18,9 +18,10 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged
 from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.episodes import Commander, MixedStart, mix
+from gaitshift.sim.push import Pusher
 from gaitshift.sim.reward import Swings, earned_bonus, walk_reward, with_bonus
 from gaitshift.sim.terrain import Terrain
-from gaitshift.sim.world import Fidelity, Pusher, World
+from gaitshift.sim.world import Fidelity, World
 
 Observations = Float32[np.ndarray, "N D"]
 

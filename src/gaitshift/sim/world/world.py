@@ -14,11 +14,7 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.sim.latency import Latency
-from gaitshift.sim.sensor_config import PERFECT, SensorConfig
-from gaitshift.sim.sensors import POSE, TWIST, Sensors, sense
-from gaitshift.sim.terrain import Fields, Terrain
-from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
-from gaitshift.sim.world.limits import (
+from gaitshift.sim.limits import (
     MOST_ANGLE,
     MOST_DISTANCE,
     MOST_FORCE,
@@ -26,6 +22,10 @@ from gaitshift.sim.world.limits import (
     check_unit,
     check_within,
 )
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.sensors import POSE, TWIST, Sensors, sense
+from gaitshift.sim.terrain import Fields, Terrain
+from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
 from gaitshift.sim.world.model import Fidelity, build_model
 from gaitshift.sim.world.randomisation import SAME, Models, Randomisation
 
