@@ -11,7 +11,7 @@ import numpy as np
 from gaitshift.data import Table, located, tables_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ANYMAL_B, Gains, Robot
+from gaitshift.robot.description import ANYMAL_B, FREE_JOINTS, Gains, Robot
 from gaitshift.robot.legs import JOINTS, LEGS
 from gaitshift.robot.mjcf_limits import check_mjcf
 
@@ -53,6 +53,7 @@ def read_robot(path: Path) -> Robot:
             stance_height=np.inf,  # measured from the model below, like the mass
             mass=np.inf,
             gains=gains,
+            joint_range=FREE_JOINTS,  # those of the model below, too
             **numbers,
         )
         with located(str(model_file)):
@@ -75,6 +76,8 @@ def from_dict(data: Any) -> Robot:
         gains = {name: Gains(**values) for name, values in data["gains"].items()}
         path = Path(data["model_file"])
         values = {**data, "gains": gains, "model_file": path, "stance": tuple(data["stance"])}
+        if "joint_range" in data:  # runs of version 0.2 have none
+            values["joint_range"] = tuple((low, high) for low, high in data["joint_range"])
         robot = Robot(**cast(dict[str, Any], values))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise GaitshiftError(f"robot is damaged: {error}") from error
@@ -154,7 +157,7 @@ def _has_site(model: mujoco.MjModel, name: str) -> bool:
 
 
 def _measured(robot: Robot, model: mujoco.MjModel) -> Robot:
-    """The robot with its mass and its height in the stance, the lowest foot just touching."""
+    """The robot with its mass, joint ranges, and height in the stance on its lowest foot."""
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0, *robot.stance]
     mujoco.mj_kinematics(model, data)
@@ -164,5 +167,15 @@ def _measured(robot: Robot, model: mujoco.MjModel) -> Robot:
             f"stance must put the feet at one height, got heights {100 * apart:.0f} cm apart; "
             f"angles are in the order {', '.join(LEGS)} × {', '.join(JOINTS)}"
         )
-    mass = float(model.body_mass.sum())
-    return replace(robot, mass=mass, stance_height=robot.foot_radius - min(feet))
+    ranges = tuple(
+        (max(low, free[0]), min(high, free[1])) if has_stops else free
+        for (low, high), has_stops, free in zip(
+            model.jnt_range[1:].tolist(), model.jnt_limited[1:], FREE_JOINTS, strict=True
+        )
+    )
+    return replace(
+        robot,
+        mass=float(model.body_mass.sum()),
+        stance_height=robot.foot_radius - min(feet),
+        joint_range=ranges,
+    )
