@@ -102,7 +102,7 @@ def test_a_soft_stop_is_slow_ends_where_the_joints_are_and_without_stiffness():
     assert np.abs(np.diff(targets, axis=0)).max() <= 2.0 * PERIOD + 1e-12
     distance = np.abs(targets - ANGLES)
     assert (np.diff(distance, axis=0) <= 1e-12).all()
-    np.testing.assert_array_equal(targets[-1], ANGLES)
+    np.testing.assert_allclose(targets[-1], ANGLES, atol=1e-12)
     since = PERIOD * np.arange(len(commands))
     np.testing.assert_allclose(stiffness, KP * np.clip(1.0 - since, 0.0, 1.0), atol=1e-6)
     assert {command.kd for command in commands} == {KD}

@@ -83,7 +83,7 @@ def test_a_stop_of_its_controller_is_no_fault():
     deployment.stop(now)
     exchange(deployment, robot, 110)
     assert deployment.is_over
-    steps(robot, 120, PERIOD * 150)
+    steps(robot, 220, PERIOD * 150)
     assert robot.is_over
     assert not robot.is_lost
 

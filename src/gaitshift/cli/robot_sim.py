@@ -30,10 +30,10 @@ _LENGTH = 50.0
 
 @dataclass(frozen=True, kw_only=True)
 class RobotSim(RobotOption, ChannelConfig):
-    """Simulate a robot in real time that is reached by datagrams, for `gaitshift deploy`.
+    """Simulate a robot in real time that is reached by datagrams, for `deploy`.
 
-    It stands until the first command. When its controller stops, it is simulated for a second more
-    and leaves its log. Where commands end without a stop, it damps its joints for good.
+    It stands until the first command. When its controller stops, it is simulated for two seconds
+    more and leaves its log. Where commands end without a stop, it damps its joints for good.
     """
 
     terrain: str = "flat"

@@ -17,7 +17,7 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.sim.world import World
 from gaitshift.sim.world.limits import MOST_ANGLE
 
-DAMPED = 1.0
+DAMPED = 2.0
 """Time for which a stopped robot is simulated on [s]; ours: it has come to rest by then."""
 
 

@@ -5,5 +5,5 @@ from gaitshift.control.deployment.link import UdpLink as UdpLink
 from gaitshift.control.deployment.loop import ControlStep as ControlStep
 from gaitshift.control.deployment.loop import Deployment as Deployment
 from gaitshift.control.deployment.loop import DeploymentConfig as DeploymentConfig
-from gaitshift.control.deployment.loop import run as run
+from gaitshift.control.deployment.real_time import run as run
 from gaitshift.control.deployment.timing import Timing as Timing
