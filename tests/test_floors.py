@@ -20,6 +20,7 @@ ON_A_ROBOT = (
     "control",
     "control.policy",
     "control.cpg",
+    "control.deployment",
     "sim.reward",
     "sim.terrain",
     "lab.log",

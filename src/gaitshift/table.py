@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -78,9 +78,12 @@ def read_typed(path: Path, columns: Columns, what: str) -> list[Row]:
         ) from error
 
 
-def write(path: Path, rows: Sequence[Row], columns: Collection[str] | None = None) -> None:
+def write(path: Path, rows: Iterable[Row], columns: Collection[str] | None = None) -> None:
     """Writes a CSV file atomically; without `columns`, those of the first row."""
-    _write(path, rows, tuple(rows[0] if columns is None else columns), _LINE_END)
+    if columns is None:
+        rows = list(rows)
+        columns = tuple(rows[0])
+    _write(path, rows, tuple(columns), _LINE_END)
 
 
 # Tables that grow --------------------------------------------------------------------------------
@@ -183,7 +186,7 @@ def _is_whole(row: Mapping[str, str]) -> bool:
     return None not in row and None not in row.values()
 
 
-def _write(path: Path, rows: Sequence[Row], columns: tuple[str, ...], line_end: str) -> None:
+def _write(path: Path, rows: Iterable[Row], columns: tuple[str, ...], line_end: str) -> None:
     with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         lines = csv.DictWriter(file, columns, lineterminator=line_end)
         lines.writeheader()

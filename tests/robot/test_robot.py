@@ -266,6 +266,17 @@ def test_effort_and_speed_limits_are_the_published_ones():
     np.testing.assert_array_equal(compiled().actuator_forcerange, [[-EFFORT, EFFORT]] * 12)
 
 
+def test_joint_ranges_are_those_of_the_model():
+    model = ANYMAL_B.spec(ANYMAL_B.gains_of("default")).compile()
+    np.testing.assert_array_equal(np.array(ANYMAL_B.joint_range), model.jnt_range[1:])
+
+
+@pytest.mark.parametrize("wrong", [((0.0, 1.0),) * 11, ((1.0, 0.0),) * 12, ((0.0, np.nan),) * 12])
+def test_joint_ranges_that_are_none_are_refused(wrong):
+    with pytest.raises(GaitshiftError, match="joint_range"):
+        replace(ANYMAL_B, joint_range=wrong)
+
+
 def test_feet_are_where_trigonometry_puts_them():
     model = compiled()
     for angles in random_angles(model, seed=0, count=20):

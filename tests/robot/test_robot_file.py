@@ -43,6 +43,19 @@ def test_the_height_of_the_stance_is_that_of_two_links_and_a_foot():
     assert robot.gains_of("default").kp == 40.0
 
 
+def test_joints_may_go_as_far_as_their_stops_and_without_stops_a_turn(tmp_path):
+    assert read_robot(PONY).joint_range[2] == (-2.6, -0.5)
+    free = changed(
+        tmp_path,
+        ('<joint axis="0 1 0" range="-2.6 -0.5"/>', '<joint axis="0 1 0"/>'),
+        file="pony.xml",
+    )
+    ranges = read_robot(free).joint_range
+    assert ranges[1] == (-1.0, 2.6)
+    assert ranges[2] == pytest.approx((-2 * np.pi, 2 * np.pi))
+    assert from_dict(json.loads(json.dumps(to_dict(read_robot(free))))).joint_range == ranges
+
+
 def test_it_stands_and_bears_its_weight_on_four_feet():
     robot = read_robot(PONY)
     world = World(robot, flat(10.0, 10.0), 2)

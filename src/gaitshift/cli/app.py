@@ -30,6 +30,8 @@ COMMANDS = {
     "transitions": "Test gait shifts of every ordered pair of gaits at random phases of the "
     "stride.",
     "report": "Make one self-contained page of a log or of a training run.",
+    "deploy": "Drive a robot that is reached by datagrams, at 100 Hz, and stop it softly.",
+    "robot-sim": "Simulate a robot in real time that is reached by datagrams, for `deploy`.",
     "view": "Show robots in the browser: a live simulation with controls, a log, or a training.",
     "bench": "Measure speed.",
 }

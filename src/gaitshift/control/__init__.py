@@ -4,6 +4,7 @@ from gaitshift.control.controller import CONTROLLERS as CONTROLLERS
 from gaitshift.control.controller import Controller as Controller
 from gaitshift.control.controller import Repertoire as Repertoire
 from gaitshift.control.driver import Driver as Driver
+from gaitshift.control.estimator import Estimation as Estimation
 from gaitshift.control.estimator import Estimator as Estimator
 from gaitshift.control.estimator import EstimatorConfig as EstimatorConfig
 from gaitshift.control.estimator import EstimatorState as EstimatorState

@@ -27,7 +27,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from gaitshift.data import check_ranges
 from gaitshift.robot.description import Robot
@@ -212,3 +212,27 @@ class Estimator:
         shank[..., 2] = np.sin(abduction) * flexion
         shank += turn[:, None]
         return self.robot.foot_radius * (shank @ (up @ _CROSS).reshape(-1, 3, 3))
+
+
+class Estimation:
+    """The estimated velocity of N robots, step after step, where it is not sensed but could be."""
+
+    def __init__(self, robot: Robot, n: int) -> None:
+        """Robots at rest; see `Estimator` for `robot`."""
+        self._estimator = Estimator(robot=robot)
+        self._state = self._estimator.begin(n)
+
+    def restart(self, ids: Int[np.ndarray, " K"]) -> None:
+        """These robots have been set down anew, at rest."""
+        if ids.size:
+            self._state = self._state.with_robots(ids, self._estimator.begin(len(ids)))
+
+    def see(self, sensed: Proprioception) -> Proprioception:
+        """What is sensed a step after the last call, with a velocity.
+
+        One that is sensed stays. Without a specific force there is none.
+        """
+        if sensed.velocity_b is not None or sensed.specific_force_b is None:
+            return sensed
+        self._state, sensed = self._estimator.step(self._state, sensed)
+        return sensed

@@ -30,6 +30,9 @@ MOST_STANCE = 2 * np.pi
 """Greatest joint angle of a stance [rad]; ours: with the largest action it is a target that
 `World` takes."""
 
+FREE_JOINTS = ((-MOST_STANCE, MOST_STANCE),) * 12
+"""Ranges of joints without stops [rad]; ours: a turn each way."""
+
 _MODELS = Path(__file__).parent / "models"
 
 
@@ -72,6 +75,8 @@ class Robot:
     """Joint target = stance + action_scale · action [rad]."""
     gains: dict[str, Gains] = field(default_factory=dict[str, Gains])
     """Presets by name; `default` is required."""
+    joint_range: tuple[tuple[float, float], ...] = FREE_JOINTS
+    """Least and greatest angle of each joint, those of the model (12 pairs) [rad]."""
 
     def __post_init__(self) -> None:
         check_text("name", self.name)
@@ -90,6 +95,16 @@ class Robot:
             if not least <= value <= most:
                 raise GaitshiftError(
                     f"robot {self.name}: {key} must be {least:g} to {most:g}, got {value:g}"
+                )
+        if len(self.joint_range) != 12:
+            raise GaitshiftError(
+                f"robot {self.name}: joint_range must have 12 pairs, got {len(self.joint_range)}"
+            )
+        for low, high in self.joint_range:
+            if not -MOST_STANCE <= low < high <= MOST_STANCE:
+                raise GaitshiftError(
+                    f"robot {self.name}: joint_range must be rising pairs of {-MOST_STANCE:.3g} to "
+                    f"{MOST_STANCE:.3g} rad, got {low:g} and {high:g}"
                 )
         if "default" not in self.gains:
             raise GaitshiftError(
@@ -142,6 +157,7 @@ class Robot:
 
 
 _HAA, _HFE, _KFE = 0.03, 0.4, 0.8
+_HIP = ((-0.72, 0.72), (-1.6, 1.6))
 
 ANYMAL_B = Robot(
     name="anymal_b",
@@ -165,4 +181,5 @@ ANYMAL_B = Robot(
         "default": Gains(kp=80.0, kd=2.0),
         "paper": Gains(kp=3.0, kd=0.2),
     },
+    joint_range=2 * (*_HIP, (-2.5, 0.0)) + 2 * (*_HIP, (0.0, 2.5)),
 )

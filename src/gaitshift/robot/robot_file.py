@@ -11,7 +11,7 @@ import numpy as np
 from gaitshift.data import Table, located, tables_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.robot.description import ANYMAL_B, Gains, Robot
+from gaitshift.robot.description import ANYMAL_B, FREE_JOINTS, Gains, Robot
 from gaitshift.robot.legs import JOINTS, LEGS
 from gaitshift.robot.mjcf_limits import check_mjcf
 from gaitshift.robot.motor import Motor
@@ -56,6 +56,7 @@ def read_robot(path: Path) -> Robot:
             mass=np.inf,
             motor=_motor(table.get("motor")),
             gains=gains,
+            joint_range=FREE_JOINTS,  # those of the model below, too
             **numbers,
         )
         with located(str(model_file)):
@@ -78,7 +79,9 @@ def from_dict(data: Any) -> Robot:
         gains = {name: Gains(**values) for name, values in data["gains"].items()}
         path, motor = Path(data["model_file"]), Motor(**data["motor"])
         values = {**data, "gains": gains, "motor": motor, "model_file": path}
-        robot = Robot(**cast(dict[str, Any], {**values, "stance": tuple(data["stance"])}))
+        values["stance"] = tuple(data["stance"])
+        values["joint_range"] = tuple((low, high) for low, high in data["joint_range"])
+        robot = Robot(**cast(dict[str, Any], values))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise GaitshiftError(f"robot is damaged: {error}") from error
     if not path.is_file():
@@ -170,7 +173,7 @@ def _has_site(model: mujoco.MjModel, name: str) -> bool:
 
 
 def _measured(robot: Robot, model: mujoco.MjModel) -> Robot:
-    """The robot with its mass and its height in the stance, the lowest foot just touching."""
+    """The robot with its mass, joint ranges, and height in the stance on its lowest foot."""
     data = mujoco.MjData(model)
     data.qpos[:] = [0, 0, 0, 1, 0, 0, 0, *robot.stance]
     mujoco.mj_kinematics(model, data)
@@ -180,5 +183,15 @@ def _measured(robot: Robot, model: mujoco.MjModel) -> Robot:
             f"stance must put the feet at one height, got heights {100 * apart:.0f} cm apart; "
             f"angles are in the order {', '.join(LEGS)} × {', '.join(JOINTS)}"
         )
-    mass = float(model.body_mass.sum())
-    return replace(robot, mass=mass, stance_height=robot.foot_radius - min(feet))
+    ranges = tuple(
+        (max(low, free[0]), min(high, free[1])) if has_stops else free
+        for (low, high), has_stops, free in zip(
+            model.jnt_range[1:].tolist(), model.jnt_limited[1:], FREE_JOINTS, strict=True
+        )
+    )
+    return replace(
+        robot,
+        mass=float(model.body_mass.sum()),
+        stance_height=robot.foot_radius - min(feet),
+        joint_range=ranges,
+    )

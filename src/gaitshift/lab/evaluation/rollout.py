@@ -7,10 +7,9 @@ from typing import Any, TypeVar
 import numpy as np
 from jaxtyping import Bool, Float
 
-from gaitshift.control import Controller, Estimator, Switcher
+from gaitshift.control import Controller, Estimation, Switcher
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
-from gaitshift.robot.state import Proprioception
 from gaitshift.shift import Decision
 from gaitshift.sim.push import PushConfig, Pusher
 from gaitshift.sim.simulator import Simulator
@@ -51,7 +50,7 @@ class Walk:
     """N robots that walk along x, one control step at a time.
 
     Where the world senses a specific force and no velocity, the controller and the switcher see the
-    velocity that an `Estimator` computes.
+    velocity of an `Estimator`.
     """
 
     def __init__(
@@ -82,9 +81,8 @@ class Walk:
         """The switcher's decision in the last step."""
         self.wanted = self._command()
         """The command in the last step, before the speed loop's trim."""
-        self._estimator = Estimator(robot=controller.robot)
-        self._estimate = self._estimator.begin(n)
-        self.sensed = self._with_velocity(world.sensed)
+        self._estimation = Estimation(controller.robot, n)
+        self.sensed = self._estimation.see(world.sensed)
         """Proprioception in the last step, with the time and the command."""
         self._seen = self.sensed
         self._asked = self.wanted
@@ -109,10 +107,8 @@ class Walk:
         target[self.fallen] = self._stance
         world.push(self._pusher.step() + force_w)
         sensed, truth = world.step(target)
-        if truth.diverged.any():  # and is set down again
-            ids = np.flatnonzero(truth.diverged)
-            self._estimate = self._estimate.with_robots(ids, self._estimator.begin(len(ids)))
-        self._seen = sensed = self._with_velocity(sensed)
+        self._estimation.restart(np.flatnonzero(truth.diverged))  # which are set down again
+        self._seen = sensed = self._estimation.see(sensed)
         self.steps += 1
         is_off = (truth.clearance < -OVER_THE_EDGE).all(axis=1)
         self.fallen = self.fallen | truth.body_contact | truth.diverged | is_off
@@ -133,13 +129,6 @@ class Walk:
             self._speed_state, self.wanted.forward_speed, sensed.forward_speed
         )
         self._asked = replace(self.wanted, forward_speed=asked)
-
-    def _with_velocity(self, sensed: Proprioception) -> Proprioception:
-        """What is sensed, with the estimated velocity where none is sensed but could be."""
-        if sensed.velocity_b is not None or sensed.specific_force_b is None:
-            return sensed
-        self._estimate, sensed = self._estimator.step(self._estimate, sensed)
-        return sensed
 
     def _command(self) -> Command:
         config, controller, n = self.config, self.controller, self.controller.n
