@@ -86,7 +86,7 @@ def log_of(contact, *, gaits=("trot",), terrain=None, **changes):
         velocity_b=np.zeros((*shape, 3)),
         foot_position_w=np.zeros((*shape, 4, 3)),
         foot_velocity_w=np.zeros((*shape, 4, 3)),
-        foot_force=np.zeros((*shape, 4)),
+        foot_force=np.where(contact, 70.0, 0.0),
         clearance=np.zeros((*shape, 4)),
         body_contact=np.zeros(shape, dtype=bool),
         diverged=np.zeros(shape, dtype=bool),
@@ -114,11 +114,13 @@ def changed(log, **changes):
     """The log with other arrays, each in whichever of its records it belongs to.
 
     An array is broadcast to the shape of the one that it replaces. `quaternion` is the attitude in
-    both records, as `velocity_b` is the velocity in both.
+    both records, as `velocity_b` is the velocity in both; feet in `contact` bear 70 N.
     """
     if "quaternion" in changes:
         quaternion = changes.pop("quaternion")
         changes |= {"orientation": quaternion, "base_quaternion_w": quaternion}
+    if "contact" in changes:
+        changes.setdefault("foot_force", np.where(changes["contact"], 70.0, 0.0))
     records = {"sensed": log.sensed, "truth": log.truth}
     known = {field.name for record in (log, *records.values()) for field in fields(record)}
     assert set(changes) <= known, set(changes) - known

@@ -75,6 +75,12 @@ def test_module_runs_without_torch(module):
     assert done.returncode == 0, done.stderr
 
 
+def test_rollouts_in_a_second_simulator_need_no_mujoco():
+    program = "import gaitshift.lab.evaluation, gaitshift.sim.bullet"
+    done = run_without(("mujoco", "gymnasium"), program)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize(("module", "needed"), [("sim.world", "mujoco"), ("learn.run", "torch")])
 def test_a_blocked_package_is_missed_where_it_is_needed(module, needed):
     done = run_without((needed,), f"import gaitshift.{module}")

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from gaitshift.robot.description import ANYMAL_B
+from gaitshift.sim.sensor_config import PERFECT
 from gaitshift.sim.terrain import flat, perlin
 from gaitshift.sim.world import World
 
@@ -22,9 +23,9 @@ UP = (0.0, 0.0, 3.0)
 """Thrown up like this [m/s], a robot stays in the air for 0.61 s."""
 
 
-def robots(n, *, terrain=LEVEL, threads=1, **where):
+def robots(n, *, terrain=LEVEL, threads=1, sensors=PERFECT, seed=0, **where):
     """A world of robots that stand at different places and headings unless told otherwise."""
-    world = World(ANYMAL_B, terrain, n, threads=threads)
+    world = World(ANYMAL_B, terrain, n, threads=threads, sensors=sensors, seed=seed)
     place(world, **where)
     return world
 
@@ -36,6 +37,11 @@ def place(world, *, xy=None, yaw=None, **rest):
     if "base_velocity_w" in rest:
         rest["base_velocity_w"] = np.broadcast_to(rest["base_velocity_w"], (n, 3)).copy()
     world.place(np.arange(n), xy=xy.astype(float), yaw=yaw.astype(float), **rest)
+
+
+def throw_apart(world, robot, torque=1e30):
+    """Turns a robot in the next step by a torque [N·m] that the checks of the world refuse."""
+    world._applied[robot, 3] = torque
 
 
 def stand(world, steps):

@@ -75,6 +75,10 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["train", "trot", "--robots", "many"], "--robots"),
         (["demo", "--episodes", "1.5"], "invalid literal for int() with base 10: '1.5'"),
         (["demo", "--speed", "3"], "--speed"),
+        (
+            ["evaluate", "trot", "--sensors", "good"],
+            "unknown sensor preset 'good'; known sensor presets: perfect, anymal, cheap",
+        ),
         (["evaluate", "trot", "--controller", "wheels"], "known controllers: policy, cpg"),
         (["evaluate", "gallop", "--controller", "cpg"], "gallop"),
         (

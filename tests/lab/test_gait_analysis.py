@@ -71,7 +71,8 @@ def trotting(*, speed: float, period: int, steps: int, fallen_from: int | None) 
 def test_figures_of_a_perfect_trot_are_those_it_was_made_of():
     """Period 40 steps: 2.5 Hz. Power 30 N·m · 2 rad/s = 60 W over 20 kg · 9.81 m/s² · 0.9 m/s.
 
-    Froude number 0.9² / (9.81 · 0.45).
+    Froude number 0.9² / (9.81 · 0.45). The motor brakes: of the heat, 30² · 15/120 = 112.5 W, the
+    60 W supply a part.
     """
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
     figures = measure(log, {"trot": TROT}, LIGHT)
@@ -86,8 +87,17 @@ def test_figures_of_a_perfect_trot_are_those_it_was_made_of():
     assert figures["phase_consistency"] == pytest.approx([1.0] * 4)
     assert figures["flight_fraction"] == 0.0
     assert figures["cost_of_transport"] == pytest.approx(60 / (20 * 9.81 * 0.9))
+    assert figures["electrical_cost_of_transport"] == pytest.approx(52.5 / (20 * 9.81 * 0.9))
+    assert figures["saturation"] == 0.0
     assert figures["froude"] == pytest.approx(0.81 / (9.81 * 0.45))
     assert figures["verdict"]["gait"] == "trot"
+
+
+def test_saturation_is_the_share_of_joints_and_steps_at_the_motors_limit():
+    """Robot 0 has one joint of twelve at 30 N·m; robot 1 lies still with none."""
+    log = trotting(speed=0.9, period=40, steps=1200, fallen_from=None)
+    weak = replace(LIGHT, motor=replace(LIGHT.motor, torque_limit=30.0))
+    assert measure(log, {"trot": TROT}, weak)["saturation"] == pytest.approx(1 / 24)
 
 
 def test_robots_count_until_their_fall_and_the_warm_up_does_not_count():
@@ -121,7 +131,7 @@ def test_clearance_is_the_median_of_the_highest_point_of_each_stride():
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
     stride = np.arange(1200) // 40
     log.truth.clearance[30::40, 0, 0] = np.array([0.02, 0.04, 0.09])[stride[30::40] % 3]
-    log.sensed.contact[10:1200:40, 0, 0] = False
+    log.truth.foot_force[10:1200:40, 0, 0] = 0.0
     figures = measure(log, {"trot": TROT}, LIGHT)
     assert figures["clearance"][0] == pytest.approx(0.04)
     assert figures["touchdowns_per_cycle"][0] == pytest.approx(2.0)

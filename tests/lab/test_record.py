@@ -49,6 +49,15 @@ def test_a_kept_log_of_other_size_is_refused_before_anything_is_recorded(
     assert Log.load(logs / "trot-flat-0.npz").fallen.shape == (round(100 * seconds), robots)
 
 
+def test_a_log_by_other_sensors_has_a_name_of_its_own(recorded, tmp_path, capsys):
+    logs = shutil.copytree(recorded, tmp_path / "logs")
+    (logs / "trot-flat-0.npz").rename(logs / "trot-flat-0-cheap.npz")
+    main([*ask(logs, 2, 0.3), "--sensors", "cheap"])
+    assert "trot-flat-0-cheap.npz exists, not repeated" in capsys.readouterr().err
+    main(ask(logs, 2, 0.3))
+    assert (logs / "trot-flat-0.npz").exists()
+
+
 def test_a_log_that_ended_as_all_robots_had_fallen_is_kept(recorded, tmp_path, capsys):
     path = shutil.copytree(recorded, tmp_path / "logs") / "trot-flat-0.npz"
     log = Log.load(path)

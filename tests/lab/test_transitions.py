@@ -194,7 +194,9 @@ def test_read_typed_gives_what_was_written(tmp_path):
     with path.open("w", newline="") as file:
         lines = csv.writer(file)
         lines.writerow(COLUMNS)
-        lines.writerow(["a", "b", "flat", 0, 8, 0, 0.0, 0.3, 8, "", "", 0.4, 80.0, "0 to 0.1", 0.0])
+        lines.writerow(
+            ["a", "b", "flat", "cheap", 0, 8, 0, 0.0, 0.3, 8, "", "", 0.4, 80.0, "0 to 0.1", 0.0]
+        )
     (row,) = read_typed(path, COLUMNS, "shifts")
     assert row["switches"] == 8
     assert row["settle_s"] == ""

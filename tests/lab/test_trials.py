@@ -10,7 +10,7 @@ import torch
 from gaitshift.cli import main
 from gaitshift.control import policy
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import SIZES, run_trials
+from gaitshift.lab.evaluation import SIZES, EvaluationConfig, run_trials
 from gaitshift.lab.evaluation import commands as commands_module
 from gaitshift.lab.evaluation import trials as trials_module
 from gaitshift.lab.evaluation.evaluate import field_length, grounds_of
@@ -19,6 +19,7 @@ from gaitshift.learn.export import describe, export
 from gaitshift.learn.learner import Learner
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.sensor_config import CHEAP
 from gaitshift.sim.terrain import flat, from_spec
 from synthetic import log_of
 
@@ -77,9 +78,12 @@ def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
 def test_batches_have_all_robots_and_seeds_of_their_own(walk_file, monkeypatch):
     monkeypatch.setattr(trials_module, "BATCH", 16 * 30)
     size = replace(TINY, pushed=40)
-    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), size, 5))
+    run = EvaluationConfig(seconds=size.seconds, sensors=CHEAP, seed=5, simulator="pybullet")
+    configs = list(trials_module._batches(TRIALS[0], policy.load(walk_file), run, size))
+    assert all(config.sensors == CHEAP for config in configs)
     assert [config.episodes for config in configs] == [16, 16, 8]
     assert [config.seed for config in configs] == [5, 6, 7]
+    assert {config.simulator for config in configs} == {"pybullet"}
 
 
 @pytest.mark.parametrize("trial", TRIALS, ids=lambda trial: trial.terrain)
@@ -158,7 +162,7 @@ def test_evaluate_prints_one_object_and_draws(walk_file, tmp_path, capsys):
 
 
 def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys, monkeypatch):
-    monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_: tried[0])
+    monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_, **__: tried[0])
     main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
     said = json.loads(capsys.readouterr().out)
     assert len(said["trials"]) == len(TRIALS) + GROUNDS + 7

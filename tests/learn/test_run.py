@@ -18,8 +18,8 @@ from gaitshift.learn.presets import PRESETS
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.learn.run import Run
 from gaitshift.sim.env import Curriculum, EnvConfig
+from gaitshift.sim.push import PushConfig
 from gaitshift.sim.reward import BONUS_SHARES, RewardConfig
-from gaitshift.sim.world import PushConfig
 from training import TINY, TROT, KilledError, create, kill_at, rows, same_bits, weights
 
 

@@ -261,16 +261,9 @@ def test_joints_are_in_the_package_order_on_the_published_axes():
 
 
 def test_effort_and_speed_limits_are_the_published_ones():
-    assert (ANYMAL_B.effort_limit, ANYMAL_B.velocity_limit) == (EFFORT, VELOCITY)
+    assert ANYMAL_B.motor.torque_limit == EFFORT
+    assert ANYMAL_B.motor.no_load_speed == VELOCITY
     np.testing.assert_array_equal(compiled().actuator_forcerange, [[-EFFORT, EFFORT]] * 12)
-
-
-@pytest.mark.parametrize("gains", [*ANYMAL_B.gains.values(), Gains(kp=17.0, kd=0.7)])
-def test_actuators_apply_the_gains(gains):
-    """In force = gain · ctrl + bias · (1, q, q̇): the gain is kp, the bias (0, -kp, -kd)."""
-    model = ANYMAL_B.spec(gains).compile()
-    np.testing.assert_array_equal(model.actuator_gainprm[:, :3], [[gains.kp, 0, 0]] * 12)
-    np.testing.assert_array_equal(model.actuator_biasprm[:, :3], [[0, -gains.kp, -gains.kd]] * 12)
 
 
 def test_feet_are_where_trigonometry_puts_them():

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from gaitshift.robot import urdf
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.show.geometry import Shape, has_meshes, meshes, put_on
 
@@ -120,5 +121,5 @@ def test_without_the_extra_it_is_drawn_from_primitives(monkeypatch: pytest.Monke
 
 
 def test_without_the_wheel_it_is_drawn_from_primitives(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(meshes, "_WHEEL", "no-such-wheel")
+    monkeypatch.setattr(urdf, "WHEEL", "no-such-wheel")
     assert not has_meshes(ANYMAL_B)

@@ -8,19 +8,24 @@ import pytest
 from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import EvaluationConfig, divergence_log, evaluate
+from gaitshift.lab.evaluation import EvaluationConfig, evaluate
+from gaitshift.lab.evaluation.divergence import divergence_log
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.show.report import write_report
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.world import World
-from worlds import LEVEL, ROUGH, arrays_of, assert_same_bits, robots, run, wild_targets
+from worlds import (
+    LEVEL,
+    ROUGH,
+    arrays_of,
+    assert_same_bits,
+    robots,
+    run,
+    throw_apart,
+    wild_targets,
+)
 
 TROT = gaits.load("trot")
-
-
-def throw_apart(world, robot, torque=1e30):
-    """Turns a robot in the next step by a torque [N·m] that the checks of the world refuse."""
-    world._applied[robot, 3] = torque
 
 
 @pytest.mark.parametrize("value", [1e6, 1e12, 1e30, np.nan])

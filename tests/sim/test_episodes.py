@@ -6,8 +6,8 @@ import pytest
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.push import PushConfig
 from gaitshift.sim.terrain import flat, perlin, slope
-from gaitshift.sim.world import PushConfig
 from hopping import FLAT, FOLD, arbitrary_actions, hop, keep_steps, run
 from worlds import velocity_w
 

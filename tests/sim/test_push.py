@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gaitshift.sim.world import PushConfig, Pusher
+from gaitshift.sim.push import PushConfig, Pusher
 from worlds import (
     GRAVITY,
     MASS,

@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 
 from gaitshift.robot.description import ANYMAL_B
+from gaitshift.sim.simulator import FRICTION
 from gaitshift.sim.terrain import step
 from gaitshift.sim.world import World
-from gaitshift.sim.world.model import FRICTION, build_model
+from gaitshift.sim.world.model import build_model
 from worlds import GRAVITY, LEVEL, MASS, STANCE, stand, wild_targets
 
 

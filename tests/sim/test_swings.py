@@ -132,7 +132,7 @@ def test_a_late_change_earns_less_of_the_bonus(strictness):
         GaitEnv(
             UNHURRIED,
             FLAT,
-            4,
+            16,
             config=EnvConfig(reward=RewardConfig(bonus_punctuality=weight)),
             threads=1,
         )
@@ -141,8 +141,8 @@ def test_a_late_change_earns_less_of_the_bonus(strictness):
     for env in envs:
         env.curriculum = Curriculum(strictness=strictness)
         env.reset(seed=0)
-    waited = np.zeros(4, dtype=int)
-    for action in arbitrary_actions(2, 300, 4, size=1.5):
+    waited = np.zeros(16, dtype=int)
+    for action in arbitrary_actions(2, 300, 16, size=1.5):
         (_, free, *_), (_, paid, ended, cut, info) = (env.step(action) for env in envs)
         waited += 1
         for robot in np.flatnonzero(info["changed"]):

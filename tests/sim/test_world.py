@@ -55,7 +55,9 @@ def test_a_thrown_robot_follows_the_parabola():
 
 
 def test_torque_is_the_pd_law_within_the_effort_limit():
-    """At the start of the last physics step: kp·(target - q) - kd·q̇, at most 80 N·m.
+    """At the start of the last physics step: kp·(target - q) - kd·q̇, within the motor's lines.
+
+    They fall from 120 N·m at rest to 0 at 15 rad/s, and are cut off at 80 N·m.
 
     The state before the last physics step comes from a plain MuJoCo simulation, which also ends
     where the world ends.
@@ -70,9 +72,9 @@ def test_torque_is_the_pd_law_within_the_effort_limit():
         mujoco.mj_step(world.model, data)
         sensed, _ = world.step(target)
         wanted = 80.0 * (target[0] - angles) - 2.0 * speeds
-        np.testing.assert_allclose(
-            sensed.joint_torque[0], np.clip(wanted, -80.0, 80.0), rtol=0, atol=1e-6
-        )
+        least, most = (np.clip(120.0 * (sign - speeds / 15.0), -80, 80) for sign in (-1, 1))
+        expected = np.clip(wanted, least, most)
+        np.testing.assert_allclose(sensed.joint_torque[0], expected, rtol=0, atol=1e-6)
         np.testing.assert_allclose(sensed.joint_position[0], data.qpos[7:], rtol=0, atol=1e-9)
         limited += np.count_nonzero(np.abs(wanted) > 80.0)
     assert limited > 20

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import tyro
 
 from gaitshift.cli.output import check_folder, emit_json, emit_table, progress, say
-from gaitshift.cli.robot_options import RobotOptions
+from gaitshift.cli.robot_options import RobotOptions, SensorOption
 from gaitshift.errors import GaitshiftError
 from gaitshift.folder_lock import only_writer
 from gaitshift.lab.evaluation import DemoConfig, run_demo
@@ -51,7 +51,7 @@ _numbers = tyro.constructors.PrimitiveConstructorSpec[tuple[float, ...]](
 
 
 @dataclass(frozen=True, kw_only=True)
-class Demo(RobotOptions, DemoConfig):
+class Demo(RobotOptions, SensorOption, DemoConfig):
     """Simulate a robot that crosses flat and rough ground and shifts its gait by itself."""
 
     gaits: Annotated[tuple[str, ...], names_option] = ()

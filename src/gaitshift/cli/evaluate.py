@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from gaitshift.cli.output import Report, emit_json, emit_table, progress, say
-from gaitshift.cli.robot_options import RobotOption
+from gaitshift.cli.robot_options import RobotOption, SensorOption
 from gaitshift.control import policy as policies
 from gaitshift.control.controller import controller_maker
 from gaitshift.errors import GaitshiftError
@@ -47,7 +47,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Evaluate(RobotOption, EvaluationConfig):
+class Evaluate(RobotOption, SensorOption, EvaluationConfig):
     """Evaluate a policy on many robots, without exploration noise.
 
     Figures exclude the first 2 s and robots after their fall.
@@ -122,7 +122,7 @@ class Evaluate(RobotOption, EvaluationConfig):
         with progress(f"{gait} on {self.terrain}") as report:
             figures, log = walk(config, report)
         if self.json:
-            emit_json({**named, **asdict(config), **figures})
+            emit_json({**named, **asdict(config), "sensors": config.sensors.name, **figures})
         else:
             title = f"{gait} on {self.terrain}, {self.episodes} robots × {self.seconds:g} s"
             emit_table(title, _figure_rows(figures))
@@ -130,14 +130,23 @@ class Evaluate(RobotOption, EvaluationConfig):
 
     def _try(self, loaded: policies.Policy, size: Literal["all", "short", "quick"]) -> Judged:
         with progress(f"trials of {loaded.gait}") as report:
-            rows, figures, log = run_trials(loaded, SIZES[size], self.seed, report)
+            rows, figures, log = run_trials(
+                loaded,
+                SIZES[size],
+                self.seed,
+                report,
+                sensors=self.sensors,
+                simulator=self.simulator,
+            )
         if self.json:
             emit_json(
                 {
                     "policy": str(loaded.path),
                     "gait": loaded.gait,
                     "size": {"name": size, **asdict(SIZES[size])},
+                    "sensors": self.sensors.name,
                     "seed": self.seed,
+                    "simulator": self.simulator,
                     "trials": [row.to_dict() for row in rows],
                     "figures": figures,
                 }
@@ -151,10 +160,17 @@ class Evaluate(RobotOption, EvaluationConfig):
 
     def _command(self, loaded: policies.Policy) -> None:
         with progress(f"commands of {loaded.gait}") as report:
-            rows = follow_commands(loaded, self.seed, report)
+            rows = follow_commands(loaded, self.seed, report, sensors=self.sensors)
         if self.json:
             followed = [asdict(row) for row in rows]
-            emit_json({"policy": str(loaded.path), "gait": loaded.gait, "commands": followed})
+            emit_json(
+                {
+                    "policy": str(loaded.path),
+                    "gait": loaded.gait,
+                    "sensors": self.sensors.name,
+                    "commands": followed,
+                }
+            )
         else:
             emit_table(f"{loaded.gait}, tracking of commands on flat ground", _followed(rows))
 
@@ -181,7 +197,10 @@ class Evaluate(RobotOption, EvaluationConfig):
         if self.commands and (self.trials or self.log or self.plot):
             raise GaitshiftError("--commands must not be given with --trials, --log or --plot")
         for field in fields(EvaluationConfig):
-            if field.name != "seed" and getattr(self, field.name) != field.default:
+            is_free = field.name in ("sensors", "seed") or (
+                self.trials and field.name == "simulator"
+            )
+            if not is_free and getattr(self, field.name) != field.default:
                 option = field.name.replace("_", "-")
                 raise GaitshiftError(f"--{option} must not be given with {mode}, which sets it")
 

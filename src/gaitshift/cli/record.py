@@ -10,7 +10,7 @@ import numpy as np
 import tyro
 
 from gaitshift.cli.output import emit_json, emit_table, progress, say
-from gaitshift.cli.robot_options import RobotOption
+from gaitshift.cli.robot_options import RobotOption, SensorOption
 from gaitshift.control import Controller
 from gaitshift.control import policy as policies
 from gaitshift.control.controller import controller_maker
@@ -20,14 +20,16 @@ from gaitshift.lab.evaluation import EvaluationConfig, RolloutConfig
 from gaitshift.lab.evaluation.courses import Course, run_course, select
 from gaitshift.lab.log import Log
 from gaitshift.lab.resume import Part, Report, run_missing
+from gaitshift.sim.sensor_config import PERFECT
 from gaitshift.table import Row
 
 
 @dataclass(frozen=True, kw_only=True)
-class Record(RobotOption):
+class Record(RobotOption, SensorOption):
     """Record gaits on the standard courses: flat, slopes, steps, stairs, pebbles, noise.
 
-    Writes OUT/GAIT-COURSE-SEED.npz, one log of about 30 MB for each gait and course. Logs that
+    Writes OUT/GAIT-COURSE-SEED.npz, or with other than perfect sensors
+    OUT/GAIT-COURSE-SEED-SENSORS.npz, one log of about 30 MB for each gait and course. Logs that
     exist are not recorded again, so an interrupted command resumes.
     """
 
@@ -95,7 +97,8 @@ class Record(RobotOption):
             emit_table(f"logs in {self.out}", table)
 
     def _path(self, gait: str, course: Course) -> Path:
-        return self.out / f"{gait}-{course.name}-{self.seed}.npz"
+        sensors = "" if self.sensors == PERFECT else f"-{self.sensors.name}"
+        return self.out / f"{gait}-{course.name}-{self.seed}{sensors}.npz"
 
     def _controller(self, name: str, n: int) -> Controller:
         return controller_maker(self.controller)([name], n, robot=self.read_robot())
@@ -103,7 +106,14 @@ class Record(RobotOption):
     def _record(self, name: str, gait: str, course: Course, report: Report) -> Row:
         """Records a log and writes it."""
         controller = self._controller(name, self.robots)
-        log = run_course(controller, course, seconds=self.seconds, seed=self.seed, report=report)
+        log = run_course(
+            controller,
+            course,
+            seconds=self.seconds,
+            seed=self.seed,
+            sensors=self.sensors,
+            report=report,
+        )
         path = self._path(gait, course)
         log.save(path)
         return _row(path, log)

@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import tyro
 
 from gaitshift.control import Controller, policy
 from gaitshift.control.controller import ControllerMaker, controller_maker
@@ -10,6 +13,24 @@ from gaitshift.control.policy import Policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.robot_file import read_robot
+from gaitshift.sim.sensor_config import PERFECT, PRESETS, SensorConfig, sensor_preset
+
+_preset_option = tyro.constructors.PrimitiveConstructorSpec[SensorConfig](
+    nargs=1,
+    metavar=f"{{{','.join(preset.name for preset in PRESETS)}}}",
+    instance_from_str=lambda args: sensor_preset(args[0]),
+    is_instance=lambda instance: isinstance(instance, SensorConfig),
+    str_from_instance=lambda instance: [instance.name],
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorOption:
+    """For a command that runs a simulated robot."""
+
+    sensors: Annotated[SensorConfig, _preset_option] = PERFECT
+    """Sensors of the robot and its link to the joints: perfect; like those of ANYmal; or cheap.
+    With the last two, nothing measures the velocity of the base."""
 
 
 @dataclass(frozen=True, kw_only=True)

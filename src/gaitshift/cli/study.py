@@ -16,7 +16,7 @@ from gaitshift.cli.output import (
     say,
 )
 from gaitshift.cli.resumable import resumable_table
-from gaitshift.cli.robot_options import RobotOptions
+from gaitshift.cli.robot_options import RobotOptions, SensorOption
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.resume import Report, run_missing
 from gaitshift.table import Row
@@ -26,7 +26,7 @@ TABLE = "crossings.csv"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Study(RobotOptions):
+class Study(RobotOptions, SensorOption):
     """Compare robots on rough ground: in either gait alone, and with shifts by each condition.
 
     Reports survival, distance, speed and cost of transport with intervals, and those of an oracle
@@ -80,15 +80,21 @@ class Study(RobotOptions):
             COLUMNS,
             "crossings",
             key=("amplitude", "way"),
-            same={"seed": self.seed, "runs": self.runs},
+            same={"sensors": self.sensors.name, "seed": self.seed, "runs": self.runs},
             overwrite=self.overwrite,
         ) as table:
 
             def crossed(way: Strategy, amplitude: float, report: Report) -> Row:
                 crossings = cross(
-                    loaded, way, amplitude=amplitude, runs=self.runs, seed=self.seed, report=report
+                    loaded,
+                    way,
+                    amplitude=amplitude,
+                    runs=self.runs,
+                    seed=self.seed,
+                    sensors=self.sensors,
+                    report=report,
                 )
-                return row_of(way, amplitude, self.seed, crossings)
+                return row_of(way, amplitude, self.seed, crossings, self.sensors)
 
             parts = [
                 table.part(

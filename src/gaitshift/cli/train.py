@@ -22,7 +22,8 @@ from gaitshift.control import policy
 from gaitshift.errors import GaitshiftError
 from gaitshift.folder_lock import only_writer
 from gaitshift.gait import gaits
-from gaitshift.lab.evaluation import divergence_log, flat_verdict
+from gaitshift.lab.evaluation import flat_verdict
+from gaitshift.lab.evaluation.divergence import divergence_log
 
 if TYPE_CHECKING:
     from gaitshift.learn.run import Row, Run

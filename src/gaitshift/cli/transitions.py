@@ -19,7 +19,7 @@ from gaitshift.cli.output import (
     say,
 )
 from gaitshift.cli.resumable import resumable_table
-from gaitshift.cli.robot_options import RobotOptions
+from gaitshift.cli.robot_options import RobotOptions, SensorOption
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.resume import Report, run_missing
 from gaitshift.sim.terrain import from_spec
@@ -30,7 +30,7 @@ TABLE, PAGE = "transitions.csv", "page.html"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Transitions(RobotOptions):
+class Transitions(RobotOptions, SensorOption):
     """Test gait shifts of every ordered pair of gaits at random phases of the stride.
 
     A shift succeeds if the robot does not fall within 5 s and shows the new gait. Writes
@@ -74,7 +74,7 @@ class Transitions(RobotOptions):
             COLUMNS,
             "shifts",
             key=("old", "new", "ground"),
-            same={"seed": self.seed, "switches": self.switches},
+            same={"sensors": self.sensors.name, "seed": self.seed, "switches": self.switches},
             overwrite=self.overwrite,
         ) as table:
 
@@ -85,9 +85,10 @@ class Transitions(RobotOptions):
                     ground=ground,
                     switches=self.switches,
                     seed=self.seed,
+                    sensors=self.sensors,
                     report=report,
                 )
-                return row_of(pair, ground, self.seed, outcomes)
+                return row_of(pair, ground, self.seed, outcomes, self.sensors)
 
             parts = [
                 table.part(

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from gaitshift.cli.output import say
-from gaitshift.cli.robot_options import RobotOptions
+from gaitshift.cli.robot_options import RobotOptions, SensorOption
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import DemoConfig
 from gaitshift.lab.log import Log
@@ -22,7 +22,7 @@ _LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 @dataclass(frozen=True, kw_only=True)
-class View(RobotOptions):
+class View(RobotOptions, SensorOption):
     """Show robots in the browser: a live simulation with controls, a log, or a training.
 
     Prints the address of the page; Ctrl-C ends it. Needs no display and no OpenGL.
@@ -72,6 +72,7 @@ class View(RobotOptions):
             track=self.track,
             robots=self.robots,
             condition=self.condition,
+            sensors=self.sensors,
             seed=self.seed,
         )
         if training is not None:

@@ -44,7 +44,7 @@ class Log(Batch):
     machine_state: Int[np.ndarray, "*batch"]
     """State of that gait's machine."""
     stance_shown: Bool[np.ndarray, "*batch"]
-    """Whether the contacts are a stance set of that gait's machine."""
+    """Whether the feet that are down in truth are a stance set of that gait's machine."""
     fallen: Bool[np.ndarray, "*batch"]
     """Whether the robot has fallen so far; a fallen robot stays down and no longer counts."""
     gaits: tuple[str, ...]

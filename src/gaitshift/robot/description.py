@@ -15,6 +15,7 @@ from jaxtyping import Float
 from gaitshift.data import check_text
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.legs import JOINTS, LEGS
+from gaitshift.robot.motor import Motor
 
 if TYPE_CHECKING:
     import mujoco
@@ -22,13 +23,8 @@ if TYPE_CHECKING:
 MOST_GAIN = 100_000.0
 """Greatest gain of a joint [N·m/rad, N·m·s/rad]; ours: a thousand times that of a large robot."""
 
-RANGES = {
-    "foot_radius": (0.001, 1.0),
-    "effort_limit": (0.01, 10_000.0),
-    "velocity_limit": (0.1, 1000.0),
-    "action_scale": (0.001, 1.0),
-}
-"""Ranges of a robot's numbers [m, N·m, rad/s, rad]; ours: far beyond any robot that walks."""
+RANGES = {"foot_radius": (0.001, 1.0), "action_scale": (0.001, 1.0)}
+"""Ranges of a robot's numbers [m, rad]; ours: far beyond any robot that walks."""
 
 MOST_STANCE = 2 * np.pi
 """Greatest joint angle of a stance [rad]; ours: with the largest action it is a target that
@@ -70,10 +66,8 @@ class Robot:
     """Mass of all its bodies [kg]."""
     foot_radius: float
     """Radius of the spherical feet [m]."""
-    effort_limit: float
-    """Largest torque of a joint [N·m]."""
-    velocity_limit: float
-    """Largest speed of a joint [rad/s]; not enforced by the simulation, but reported."""
+    motor: Motor
+    """The motor of each joint."""
     action_scale: float
     """Joint target = stance + action_scale · action [rad]."""
     gains: dict[str, Gains] = field(default_factory=dict[str, Gains])
@@ -128,7 +122,7 @@ class Robot:
         return self.gains[preset]
 
     def spec(self, gains: Gains) -> "mujoco.MjSpec":
-        """The robot's model with these gains in its joint controllers, without a ground.
+        """The robot's model with its motors and these gains in their controllers, without a ground.
 
         MuJoCo is imported only here: a robot that runs policies needs no simulator.
         """
@@ -139,8 +133,11 @@ class Robot:
             mujoco.set_mju_user_warning(logging.getLogger("mujoco").info)
         spec = mujoco.MjSpec.from_file(str(self.model_file))
         for actuator in cast("list[mujoco.MjsActuator]", spec.actuators):
-            actuator.gainprm[0] = gains.kp
-            actuator.biasprm[1:3] = (-gains.kp, -gains.kd)
+            self.motor.drive(actuator, kp=gains.kp, kd=gains.kd)
+        for joint in cast("list[mujoco.MjsJoint]", spec.joints):
+            if joint.type == mujoco.mjtJoint.mjJNT_HINGE:
+                joint.frictionloss += self.motor.friction
+                joint.armature += self.motor.armature
         return spec
 
 
@@ -159,8 +156,9 @@ ANYMAL_B = Robot(
     stance_height=0.4927,
     mass=30.475396462000006,
     foot_radius=0.031,
-    effort_limit=80.0,
-    velocity_limit=15.0,
+    # Peak torque and speed are the URDF's, the torque at rest is that of Isaac Lab's model of the
+    # drive. Neither gives a rotor's inertia.
+    motor=Motor(torque_limit=80.0, no_load_speed=15.0, stall_torque=120.0),
     action_scale=0.3,
     gains={
         # 80/2 is legged_gym's pair for ANYmal; the paper's 3/0.2 cannot hold 30 kg (docs/paper.md).

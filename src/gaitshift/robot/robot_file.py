@@ -14,9 +14,11 @@ from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Gains, Robot
 from gaitshift.robot.legs import JOINTS, LEGS
 from gaitshift.robot.mjcf_limits import check_mjcf
+from gaitshift.robot.motor import Motor
 
-_NUMBERS = ("foot_radius", "effort_limit", "velocity_limit", "action_scale")
-_KEYS = ("name", "model", "stance", *_NUMBERS, "gains")
+_NUMBERS = ("foot_radius", "action_scale")
+_KEYS = ("name", "model", "stance", *_NUMBERS, "motor", "gains")
+_MOTOR = ("torque_limit", "no_load_speed", "stall_torque", "friction", "armature")
 
 _LEVEL = 0.05
 """Largest difference of foot heights in a stance [m]; ours."""
@@ -52,6 +54,7 @@ def read_robot(path: Path) -> Robot:
             stance=stance,
             stance_height=np.inf,  # measured from the model below, like the mass
             mass=np.inf,
+            motor=_motor(table.get("motor")),
             gains=gains,
             **numbers,
         )
@@ -73,9 +76,9 @@ def from_dict(data: Any) -> Robot:
     """
     try:
         gains = {name: Gains(**values) for name, values in data["gains"].items()}
-        path = Path(data["model_file"])
-        values = {**data, "gains": gains, "model_file": path, "stance": tuple(data["stance"])}
-        robot = Robot(**cast(dict[str, Any], values))
+        path, motor = Path(data["model_file"]), Motor(**data["motor"])
+        values = {**data, "gains": gains, "motor": motor, "model_file": path}
+        robot = Robot(**cast(dict[str, Any], {**values, "stance": tuple(data["stance"])}))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise GaitshiftError(f"robot is damaged: {error}") from error
     if not path.is_file():
@@ -87,6 +90,19 @@ def _gains(preset: str, data: object) -> Gains:
     with located(f"gains.{preset}"):
         table = Table(data, keys=("kp", "kd"))
         return Gains(kp=table.number("kp"), kd=table.number("kd"))
+
+
+def _motor(data: object) -> Motor:
+    with located("motor"):
+        table = Table(data, keys=_MOTOR)
+        limit = table.number("torque_limit")
+        return Motor(
+            torque_limit=limit,
+            no_load_speed=table.number("no_load_speed"),
+            stall_torque=table.number("stall_torque", default=limit),
+            friction=table.number("friction", default=0.0),
+            armature=table.number("armature", default=0.0),
+        )
 
 
 def _checked_model(robot: Robot) -> mujoco.MjModel:

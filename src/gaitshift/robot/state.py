@@ -19,6 +19,10 @@ from gaitshift.robot.command import CONTROL_PERIOD
 GRAVITY = 9.81
 """[m/s²]"""
 
+CONTACT_FORCE = 1.0
+"""A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
+value of legged_gym."""
+
 
 class Batch:
     """A frozen dataclass of arrays that share their leading axes, `*batch` in their shapes.
@@ -231,6 +235,11 @@ class Privileged(Moving):
     diverged: Bool[np.ndarray, "*batch"]
     """Whether the simulation diverged in the step that ended here: the robot has failed, and the
     other fields describe it after it was set down again."""
+
+    @cached_property
+    def foot_contact(self) -> Bool[np.ndarray, "*batch 4"]:
+        """Whether each foot bears on the ground."""
+        return self.foot_force > CONTACT_FORCE
 
 
 def rotation_of(quaternion: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, "*batch 3 3"]:

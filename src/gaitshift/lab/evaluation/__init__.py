@@ -5,7 +5,6 @@ from gaitshift.lab.evaluation.commands import follow_commands as follow_commands
 from gaitshift.lab.evaluation.demo import DemoConfig as DemoConfig
 from gaitshift.lab.evaluation.demo import run_demo as run_demo
 from gaitshift.lab.evaluation.demo import summarise as summarise
-from gaitshift.lab.evaluation.divergence import divergence_log as divergence_log
 from gaitshift.lab.evaluation.evaluate import EvaluationConfig as EvaluationConfig
 from gaitshift.lab.evaluation.evaluate import evaluate as evaluate
 from gaitshift.lab.evaluation.evaluate import evaluate_controller as evaluate_controller

@@ -8,6 +8,7 @@ import numpy as np
 
 from gaitshift.control.policy import Policy
 from gaitshift.lab.evaluation.evaluate import EvaluationConfig, evaluate
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 
 POINTS = 5
 """Number of commands tried in a range, its ends included."""
@@ -35,7 +36,11 @@ class Followed:
 
 
 def follow_commands(
-    policy: Policy, seed: int = 0, report: Callable[[int, int], None] = lambda done, total: None
+    policy: Policy,
+    seed: int = 0,
+    report: Callable[[int, int], None] = lambda done, total: None,
+    *,
+    sensors: SensorConfig = PERFECT,
 ) -> list[Followed]:
     """Speeds over their range at the nominal frequency, then frequencies at the nominal speed.
 
@@ -47,7 +52,7 @@ def follow_commands(
     asked += [(own[0], frequency) for frequency in _spread(info.stride_frequency_range)]
     rows: list[Followed] = []
     for speed, frequency in asked:
-        rows.append(_follow(policy, speed, frequency, seed))
+        rows.append(_follow(policy, speed, frequency, sensors, seed))
         report(len(rows), len(asked))
     return rows
 
@@ -56,7 +61,9 @@ def _spread(ends: list[float]) -> list[float]:
     return np.linspace(ends[0], ends[1], POINTS).tolist()
 
 
-def _follow(policy: Policy, speed: float, frequency: float, seed: int) -> Followed:
+def _follow(
+    policy: Policy, speed: float, frequency: float, sensors: SensorConfig, seed: int
+) -> Followed:
     figures, _ = evaluate(
         policy,
         EvaluationConfig(
@@ -64,6 +71,7 @@ def _follow(policy: Policy, speed: float, frequency: float, seed: int) -> Follow
             seconds=SECONDS,
             speed=speed,
             stride_frequency=frequency,
+            sensors=sensors,
             seed=seed,
         ),
     )

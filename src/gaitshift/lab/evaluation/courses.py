@@ -7,6 +7,7 @@ from gaitshift.control import Controller
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.evaluate import EvaluationConfig, run_controller
 from gaitshift.lab.log import Log
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 
 AMPLITUDES = (0.05, 0.07, 0.10, 0.15, 0.20)
 """Amplitudes of the noise that robots walk onto and off [m]."""
@@ -77,10 +78,15 @@ def run_course(
     *,
     seconds: float,
     seed: int,
+    sensors: SensorConfig = PERFECT,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Log:
     """Robots in one gait on a course, on eight grounds of a seed where the ground is random."""
     config = EvaluationConfig(
-        terrain=course.terrain, episodes=controller.n, seconds=seconds, seed=seed
+        terrain=course.terrain,
+        episodes=controller.n,
+        seconds=seconds,
+        sensors=sensors,
+        seed=seed,
     )
     return run_controller(controller, config, values=True, report=report)

@@ -14,8 +14,9 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
 from gaitshift.shift import GaitGraph, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
-from gaitshift.sim.world import World
 
 RUN_OUT = 8.0
 """Metres of level ground behind the finish, where faster robots wait for slower ones."""
@@ -35,7 +36,7 @@ _NUMBERS = ("alpha", "beta", "leak", "alpha_back", "beta_back", "hold")
 
 
 @dataclass(frozen=True, kw_only=True)
-class DemoConfig:
+class DemoConfig(SimulatorChoice):
     """Settings of the demonstration."""
 
     track: str = "flat@8,perlin:0.10@12,flat@10"
@@ -70,6 +71,8 @@ class DemoConfig:
     """Time between two shifts of `gaits` [s]."""
     at: tuple[float, ...] = ()
     """Times of the shifts between `gaits` [s], in place of `every`."""
+    sensors: SensorConfig = PERFECT
+    """Sensors of the robots and their link to the joints."""
     episodes: int = 1
     """Number of robots, each with its own track and start; pictures show robot 0."""
     seed: int = 0
@@ -138,7 +141,15 @@ def run_demo(
     finish = _finish(config, grounds[0])
     slowest = float(controller.repertoire.forward_speed.min())
     run = RolloutConfig(seconds=_seconds(config, finish, slowest))
-    world = World(controller.robot, grounds, n, gains=controller.gains)
+    make_world = simulator_maker(config.simulator)
+    world = make_world(
+        controller.robot,
+        grounds,
+        n,
+        gains=controller.gains,
+        sensors=config.sensors,
+        seed=config.seed,
+    )
     start = np.tile([START, 0.0], (n, 1))
     log = rollout(
         world,

@@ -15,8 +15,10 @@ from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
+from gaitshift.sim.push import PushConfig
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
 from gaitshift.sim.terrain import Terrain, from_spec
-from gaitshift.sim.world import PushConfig, World
 
 FIELDS = 8
 """Number of different grounds among which robots are divided where the ground is random."""
@@ -33,7 +35,7 @@ down a slope of 10° shipped policies walk 11 % further than commanded."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluationConfig:
+class EvaluationConfig(SimulatorChoice):
     """Settings of an evaluation."""
 
     terrain: str = "flat"
@@ -51,8 +53,10 @@ class EvaluationConfig:
     the mean speed equals the commanded speed."""
     push: float = 0.0
     """Largest push on the base [N]; a push lasts 0.2 s and comes every 2 s."""
+    sensors: SensorConfig = PERFECT
+    """Sensors of the robots and their link to the joints."""
     seed: int = 0
-    """Seed of terrains, starts and pushes."""
+    """Seed of terrains, starts, pushes and sensors."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.episodes <= 100_000:
@@ -132,7 +136,15 @@ def run_controller(
     own = float(controller.repertoire.own_command(controller.gait).forward_speed.max())
     speed = own if config.speed is None else config.speed
     grounds = grounds_of(config.terrain, seed=config.seed, speed=speed, seconds=config.seconds)
-    world = World(controller.robot, grounds, controller.n, gains=controller.gains)
+    make = simulator_maker(config.simulator)
+    world = make(
+        controller.robot,
+        grounds,
+        controller.n,
+        gains=controller.gains,
+        sensors=config.sensors,
+        seed=config.seed,
+    )
     start = starts(controller, rng)
     return rollout(
         world, controller, run, start_xy=start, rng=rng, finish_x=finish_x, report=report

@@ -12,7 +12,8 @@ from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift import Decision
-from gaitshift.sim.world import PushConfig, Pusher, World
+from gaitshift.sim.push import PushConfig, Pusher
+from gaitshift.sim.simulator import Simulator
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +56,7 @@ class Walk:
 
     def __init__(
         self,
-        world: World,
+        world: Simulator,
         controller: Controller,
         config: RolloutConfig,
         *,
@@ -153,7 +154,7 @@ class Walk:
 
 
 def rollout(
-    world: World,
+    world: Simulator,
     controller: Controller,
     config: RolloutConfig,
     *,
@@ -213,7 +214,7 @@ def step_of(walk: Walk) -> Log:
         threshold=nothing if decision is None else decision.threshold,
         gait=controller.gait.copy(),
         machine_state=controller.machine_state.copy(),
-        stance_shown=controller.repertoire.stance_shown(controller.gait, walk.sensed.contact),
+        stance_shown=controller.repertoire.stance_shown(controller.gait, world.truth.foot_contact),
         fallen=walk.fallen.copy(),
         gaits=controller.repertoire.gaits,
         robot=controller.robot.name,

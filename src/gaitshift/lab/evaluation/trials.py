@@ -1,7 +1,7 @@
 """The standard trials of a shipped policy, and the limits of their figures."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any, Literal
 
@@ -20,6 +20,8 @@ from gaitshift.lab.evaluation.evaluate import (
 from gaitshift.lab.gait_analysis import Check, checks
 from gaitshift.lab.gait_analysis.verdict import FIRST, limits_of
 from gaitshift.lab.log import Log
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.simulator import SimulatorName
 
 BATCH = 1_000_000
 """Largest number of control steps of all robots in a batch: its log takes about 330 MB."""
@@ -142,13 +144,22 @@ def run_trials(
     size: Size,
     seed: int = 0,
     report: Report = lambda done, total: None,
+    *,
+    sensors: SensorConfig = PERFECT,
+    simulator: SimulatorName = "mujoco",
 ) -> tuple[list[Row], dict[str, Any], Log]:
     """All trials of a policy: the table, the figures of its gait on flat ground, and that log.
 
     `report` is called with the number of control steps done, of all robots, and the total.
     """
-    gait = EvaluationConfig(episodes=size.episodes, seconds=size.seconds, seed=seed)
-    plan = [list(_batches(trial, policy, size, seed)) for trial in TRIALS]
+    gait = EvaluationConfig(
+        episodes=size.episodes,
+        seconds=size.seconds,
+        sensors=sensors,
+        seed=seed,
+        simulator=simulator,
+    )
+    plan = [list(_batches(trial, policy, gait, size)) for trial in TRIALS]
     total = sum(_cost(config) for config in (gait, *(c for configs in plan for c in configs)))
     done = 0
 
@@ -175,15 +186,18 @@ def run_trials(
     return rows, figures, log
 
 
-def _batches(trial: Trial, policy: Policy, size: Size, seed: int) -> Iterator[EvaluationConfig]:
-    """The runs of a trial, each with its own seed and so its own grounds."""
-    speed, seconds = policy.info.forward_speed, size.seconds
+def _batches(
+    trial: Trial, policy: Policy, run: EvaluationConfig, size: Size
+) -> Iterator[EvaluationConfig]:
+    """The runs of a trial, like `run`, each with its own seed and so its own grounds."""
+    speed, seconds, seed = policy.info.forward_speed, size.seconds, run.seed
     if trial.figure == "lateral_error_p95":
         seconds = 2.0 + 1.5 * size.distance / speed  # for robots at two thirds of their speed
     left = size.pushed if trial.push else size.episodes
     most = max(1, int(BATCH / (100 * seconds) / FIELDS)) * FIELDS
     while left > 0:
-        yield EvaluationConfig(
+        yield replace(
+            run,
             terrain=trial.spec(field_length(speed, seconds)),
             episodes=min(left, most),
             seconds=seconds,

@@ -32,21 +32,25 @@ def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
     speed = log.truth.forward_speed[alive]
     mean = float(speed.mean(dtype=float))
     joint_speed = sensed.need("joint_velocity", "gait figures")[alive]
+    torque = sensed.need("joint_torque", "gait figures")[alive]
     power = sensed.power[alive]
     turn = sensed.need("angular_velocity_b", "gait figures")[..., :2][alive]
-    too_fast = np.abs(joint_speed).max(axis=-1) > robot.velocity_limit
+    too_fast = np.abs(joint_speed).max(axis=-1) > robot.motor.no_load_speed
     height = sensed.base_height[alive]
+    drag = robot.mass * GRAVITY * max(abs(mean), 1e-3)  # power of a cost of transport of 1
     values = (
         mean,
         abs(mean - float(command.mean())),
         float(np.sqrt(np.square(speed - command).mean())),
         _heading_drift(sample),
         float(sensed.yaw[alive].std()),
-        float(power.mean(dtype=float)) / (robot.mass * GRAVITY * max(abs(mean), 1e-3)),
+        float(power.mean(dtype=float)) / drag,
+        float(robot.motor.electrical_power(torque, joint_speed).mean(dtype=float)) / drag,
         mean**2 / (GRAVITY * max(float(np.median(height)), 1e-3)),
         float(turn[:, 0].std(dtype=float)),
         float(turn[:, 1].std(dtype=float)),
         float(too_fast.mean()),
+        float(robot.motor.is_saturated(torque, joint_speed).mean()),
     )
     return dict(zip(_NAMES, values, strict=True))
 
@@ -58,10 +62,12 @@ _NAMES = (
     "heading_drift",
     "heading_error_sd",
     "cost_of_transport",
+    "electrical_cost_of_transport",
     "froude",
     "roll_rate_sd",
     "pitch_rate_sd",
     "overspeed",
+    "saturation",
 )
 
 
@@ -198,10 +204,12 @@ def measure(
       mean command; `speed_rmse` [m/s]: root mean square of the difference at each step.
     - `heading_drift` [rad/s]: root mean square over robots of the net turn less the commanded turn,
       over its time; `heading_error_sd` [rad]: spread of the heading about the line x.
-    - `cost_of_transport`: mean mechanical power Σ|τ q̇| over m·g·v.
+    - `cost_of_transport`: mean mechanical power Σ|τ q̇| over m·g·v; `electrical_cost_of_transport`:
+      that of the motors' electrical power (`Motor.electrical_power`).
     - `froude`: v²/(g h), v the mean speed, h the median height of the base over the lowest foot.
     - `roll_rate_sd`, `pitch_rate_sd` [rad/s]: spread of the body's angular velocity about x and y.
-    - `overspeed`: share of steps in which a joint is faster than the robot's limit.
+    - `overspeed`: share of steps in which a joint is faster than its motor without load.
+    - `saturation`: share of joints and steps in which a motor gives all its torque.
     - `slip` [m/s]: mean horizontal speed of the feet in contact.
     - `pattern_fraction`: share of steps whose contacts are a stance set of the gait's machine.
     - `cycles_per_s` [Hz]: full cycles of the machine, counted by entries into its first state.
@@ -221,7 +229,7 @@ def measure(
         log: the run; where it has several gaits, phases and verdict are those of the one that was
             active for most of the time.
         machines: the machines of the gaits in it, by name.
-        robot: the robot of the log, for its mass and its joint speed limit.
+        robot: the robot of the log, for its mass and its motors.
         warm_up: seconds left out.
     """
     sample = Sample.of(log, warm_up)

@@ -75,7 +75,7 @@ def _rhythm(phases: Phases, machine: RewardMachine) -> float:
 
 
 def _pattern(sample: Sample, machine: RewardMachine) -> float:
-    return share_in_order(sample.log.sensed.contact, sample.alive, machine)
+    return share_in_order(sample.log.truth.foot_contact, sample.alive, machine)
 
 
 BRIEF = 3

@@ -96,18 +96,18 @@ class Sample:
 
     @cached_property
     def contact(self) -> Bool[np.ndarray, "L N 4"]:
-        """Feet that are down, of robots on their feet; as they were logged."""
-        return self.log.sensed.contact & self.alive[..., None]
+        """Feet that are down in truth, of robots on their feet."""
+        return self.log.truth.foot_contact & self.alive[..., None]
 
     @cached_property
     def onsets(self) -> Bool[np.ndarray, "L N 4"]:
         """Where a foot is down that was up in the step before: every contact, bounces too."""
-        return self._late(onsets(self.whole.sensed.contact)) & self.alive[..., None]
+        return self._late(onsets(self.whole.truth.foot_contact)) & self.alive[..., None]
 
     @cached_property
     def touchdowns(self) -> Bool[np.ndarray, "L N 4"]:
         """Where a foot ends a swing: onsets that are no bounce (`steady`)."""
-        steps = onsets(steady(self.whole.sensed.contact, self.period))
+        steps = onsets(steady(self.whole.truth.foot_contact, self.period))
         return self._late(steps) & self.alive[..., None]
 
     def entries(self, machines: Mapping[str, RewardMachine]) -> Bool[np.ndarray, "L N"]:

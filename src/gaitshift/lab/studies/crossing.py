@@ -16,6 +16,7 @@ from gaitshift.lab.identification import is_rough, wilson
 from gaitshift.lab.log import Log
 from gaitshift.robot.state import GRAVITY, Privileged
 from gaitshift.shift import GaitGraph, between, load_graph
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.world import World
 from gaitshift.table import Row, markdown
 
@@ -83,11 +84,12 @@ def cross(
     amplitude: float,
     runs: int,
     seed: int,
+    sensors: SensorConfig = PERFECT,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Crossings:
     """Runs robots over noise of an amplitude [m]; fields and starts are the same for all."""
     return in_batches(
-        lambda n, seed: _batch(policies, way, amplitude, n, seed=seed),
+        lambda n, seed: _batch(policies, way, amplitude, n, sensors=sensors, seed=seed),
         runs,
         most=BATCH,
         seed=seed,
@@ -96,7 +98,13 @@ def cross(
 
 
 def _batch(
-    policies: Mapping[str, Policy], way: Strategy, amplitude: float, n: int, *, seed: int
+    policies: Mapping[str, Policy],
+    way: Strategy,
+    amplitude: float,
+    n: int,
+    *,
+    sensors: SensorConfig,
+    seed: int,
 ) -> Crossings:
     rng = np.random.default_rng(seed)
     way_to_go = BEFORE + NOISE + AFTER
@@ -106,7 +114,7 @@ def _batch(
     track = f"flat@{BEFORE + 2:g},{noise},flat@{2 * AFTER + 10:g}"
     grounds = grounds_of(track, seed=seed, speed=0.0, seconds=seconds)
     driver = Driver({gait: policies[gait] for gait in way.gaits}, n, start=way.start)
-    world = World(driver.robot, grounds, n, gains=driver.gains)
+    world = World(driver.robot, grounds, n, gains=driver.gains, sensors=sensors, seed=seed)
     name, x0, length = grounds[0].name, grounds[0].origin[0], grounds[0].size[0]
 
     def rough(truth: Privileged) -> Bool[np.ndarray, " N"]:
@@ -155,6 +163,7 @@ def measure_crossings(log: Log, way_to_go: float, mass: float) -> Crossings:
 COLUMNS: dict[str, type] = {
     "amplitude": float,
     "way": str,
+    "sensors": str,
     "seed": int,
     "runs": int,
     "survived": int,
@@ -179,7 +188,13 @@ ENOUGH = 2
 """Largest number of shifts per stretch of noise without chatter."""
 
 
-def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> Row:
+def row_of(
+    way: Strategy,
+    amplitude: float,
+    seed: int,
+    crossings: Crossings,
+    sensors: SensorConfig = PERFECT,
+) -> Row:
     """The results of the crossings of one way, as a row."""
     n, fell = len(crossings.fell), int(crossings.fell.sum())
     low, high = wilson(np.array([float(n - fell)]), np.array([float(n)]))
@@ -192,6 +207,7 @@ def row_of(way: Strategy, amplitude: float, seed: int, crossings: Crossings) -> 
     row: Row = {
         "amplitude": amplitude,
         "way": way.name,
+        "sensors": sensors.name,
         "seed": seed,
         "runs": n,
         "survived": n - fell,

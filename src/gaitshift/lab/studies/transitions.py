@@ -17,6 +17,7 @@ from gaitshift.lab.log import Log
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 from gaitshift.shift import Decision
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.world import World
 from gaitshift.table import Row, markdown
 
@@ -74,11 +75,12 @@ def run_pair(
     ground: str,
     switches: int,
     seed: int,
+    sensors: SensorConfig = PERFECT,
     report: Callable[[int, int], None] = lambda done, total: None,
 ) -> Outcomes:
     """Shifts robots from one gait to the other, each at its own phase of the stride."""
     return in_batches(
-        lambda n, seed: _run_batch(policies, pair, ground, n, seed=seed),
+        lambda n, seed: _run_batch(policies, pair, ground, n, sensors=sensors, seed=seed),
         switches,
         most=BATCH,
         seed=seed,
@@ -103,7 +105,13 @@ class _AtSteps:
 
 
 def _run_batch(
-    policies: Mapping[str, Policy], pair: Pair, ground: str, n: int, *, seed: int
+    policies: Mapping[str, Policy],
+    pair: Pair,
+    ground: str,
+    n: int,
+    *,
+    sensors: SensorConfig,
+    seed: int,
 ) -> Outcomes:
     rng = np.random.default_rng(seed)
     old, new = policies[pair.old], policies[pair.new]
@@ -113,7 +121,7 @@ def _run_batch(
     fastest = max(old.info.forward_speed, new.info.forward_speed)
     grounds = grounds_of(ground, seed=seed, speed=fastest, seconds=seconds)
     driver = Driver({pair.old: old, pair.new: new}, n, start=pair.old)
-    world = World(driver.robot, grounds, n, gains=driver.gains)
+    world = World(driver.robot, grounds, n, gains=driver.gains, sensors=sensors, seed=seed)
     log = rollout(
         world,
         driver,
@@ -179,6 +187,7 @@ COLUMNS: dict[str, type] = {
     "old": str,
     "new": str,
     "ground": str,
+    "sensors": str,
     "seed": int,
     "switches": int,
     "successes": int,
@@ -216,7 +225,9 @@ HEAD = (
 """Head of the table of `row_cells`."""
 
 
-def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
+def row_of(
+    pair: Pair, ground: str, seed: int, outcomes: Outcomes, sensors: SensorConfig = PERFECT
+) -> Row:
     """The results of the shifts of a pair, as a row."""
     n, good = len(outcomes.success), int(outcomes.success.sum())
     low, high = wilson(np.array([float(good)]), np.array([float(n)]))
@@ -231,6 +242,7 @@ def row_of(pair: Pair, ground: str, seed: int, outcomes: Outcomes) -> Row:
         "old": pair.old,
         "new": pair.new,
         "ground": ground,
+        "sensors": sensors.name,
         "seed": seed,
         "switches": n,
         "successes": good,

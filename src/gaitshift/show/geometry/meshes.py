@@ -16,10 +16,8 @@ import trimesh
 from jaxtyping import Float, Int
 
 from gaitshift.robot.description import Robot
+from gaitshift.robot.urdf import LEGS_BY_URDF, WHEEL, urdf_of
 from gaitshift.whole_file import replacing
-
-_LEGS = {"LF": "FL", "RF": "FR", "LH": "BL", "RH": "BR"}
-"""Names of the legs in the URDF, and here."""
 
 _CARBON = "0.2 0.2 0.21 1"
 """Colour in place of the textures of carbon fibre."""
@@ -56,7 +54,7 @@ def convert(urdf: Path) -> list[Part]:
         if mesh is None or origin is None:
             continue
         leg, _, name = link.attrib["name"].partition("_")
-        body = f"{_LEGS[leg]}_{name.lower()}" if name else leg
+        body = f"{LEGS_BY_URDF[leg]}_{name.lower()}" if name else leg
         file = urdf.parents[2] / mesh.attrib["filename"].partition("/robots/")[2]
         roll, pitch, yaw = (float(value) for value in origin.attrib["rpy"].split())
         pose = cast(Any, trimesh.transformations).euler_matrix(roll, pitch, yaw)
@@ -115,11 +113,7 @@ def _without_pictures(file: Path) -> bytes:
 VISUAL = 2
 """Group of the visual shapes in the models."""
 
-_WHEEL = "example-robot-data"
 _NEEDED = ("collada", "fast_simplification")
-_ROBOTS = "cmeel.prefix/share/example-robot-data/robots"
-_URDF = {"anymal_b": "anymal_b_simple_description/robots/anymal.urdf"}
-"""Robots whose surfaces are in the wheel, by name."""
 
 
 def has_meshes(robot: Robot) -> bool:
@@ -181,18 +175,12 @@ def _cache(robot: Robot) -> Path | None:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     except RuntimeError:
         return None
-    return base / "gaitshift" / f"{robot.name}-{metadata.version(_WHEEL)}.npz"
+    return base / "gaitshift" / f"{robot.name}-{metadata.version(WHEEL)}.npz"
 
 
 def _description(robot: Robot) -> Path | None:
     """The robot's URDF in the wheel, if all of the extra is installed."""
-    if robot.name not in _URDF or not all(find_spec(name) for name in _NEEDED):
-        return None
-    try:
-        path = metadata.distribution(_WHEEL).locate_file(f"{_ROBOTS}/{_URDF[robot.name]}")
-    except metadata.PackageNotFoundError:
-        return None
-    return Path(str(path)) if Path(str(path)).is_file() else None
+    return urdf_of(robot) if all(find_spec(name) for name in _NEEDED) else None
 
 
 def _write(path: Path, parts: list[Part]) -> None:

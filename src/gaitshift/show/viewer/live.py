@@ -16,6 +16,7 @@ from gaitshift.robot.description import Robot
 from gaitshift.shift import GaitGraph, Oracle, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.show.geometry import Frame
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.terrain import from_spec
 from gaitshift.sim.world import World
 
@@ -37,8 +38,10 @@ class LiveConfig:
     """Spec of the ground."""
     robots: int = 1
     """Number of robots; charts show the first, and the others are drawn as its ghosts."""
+    sensors: SensorConfig = PERFECT
+    """Sensors of the robots and their link to the joints."""
     seed: int = 0
-    """Seed of the ground and of the starts."""
+    """Seed of the ground, the starts and the sensors."""
     start: str = "trot"
     """The gait at the start, and the one for flat ground."""
     rough_gait: str = "bound"
@@ -89,7 +92,14 @@ class LiveRun:
         )
         self._driver = driver = Driver(self._policies, config.robots, start=config.start)
         switcher = self._switcher(config)
-        world = World(driver.robot, ground, config.robots, gains=driver.gains)
+        world = World(
+            driver.robot,
+            ground,
+            config.robots,
+            gains=driver.gains,
+            sensors=config.sensors,
+            seed=config.seed,
+        )
         rng = np.random.default_rng(config.seed)
         start = np.zeros((config.robots, 2))
         start[:, 0] = START

@@ -6,8 +6,9 @@ from gaitshift.control.observation import DEFAULT_SLICES, PAPER_SLICES, check_sl
 from gaitshift.data import check_ranges
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
+from gaitshift.sim.push import PushConfig
 from gaitshift.sim.reward import RewardConfig
-from gaitshift.sim.world import PushConfig
+from gaitshift.sim.world import Randomisation
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -18,6 +19,8 @@ class EnvConfig:
     """Weights of the one shared reward."""
     push: PushConfig = field(default_factory=PushConfig)
     """Disturbances; none by default."""
+    randomisation: Randomisation = field(default_factory=Randomisation)
+    """What differs from robot to robot; drawn anew at the start of each episode."""
     observed: tuple[str, ...] = DEFAULT_SLICES
     """Slices of the observation, in order."""
     gains: str = "default"

@@ -18,9 +18,10 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged
 from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.episodes import Commander, MixedStart, mix
+from gaitshift.sim.push import Pusher
 from gaitshift.sim.reward import Swings, earned_bonus, walk_reward, with_bonus
 from gaitshift.sim.terrain import Terrain
-from gaitshift.sim.world import Fidelity, Pusher, World
+from gaitshift.sim.world import Fidelity, World
 
 Observations = Float32[np.ndarray, "N D"]
 
@@ -56,7 +57,14 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             action_scale=robot.action_scale,
         )
         """Observation, meaning of actions, and steps of the machine."""
-        self.world = World(robot, terrain, num_envs, gains=self.config.gains, threads=threads)
+        self.world = World(
+            robot,
+            terrain,
+            num_envs,
+            gains=self.config.gains,
+            randomisation=self.config.randomisation,
+            threads=threads,
+        )
         self.curriculum = Curriculum()
         """The present difficulty; may be replaced between two steps."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
@@ -176,6 +184,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
         rng, config, count = self._rng, self.config, len(ids)
+        self.world.redraw(ids, rng)
         moving, start = self._draw_mixed(ids)
         yaw = rng.choice((0.0, np.pi), count)  # edges lie across x: up and down, head on
         velocity = np.zeros((count, 3))

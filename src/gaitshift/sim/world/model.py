@@ -6,13 +6,11 @@ import mujoco
 
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Gains, Robot
+from gaitshift.sim.simulator import FRICTION
 from gaitshift.sim.terrain import Terrain, to_unit_interval
 
 GROUND = "ground"
 """Name of the ground's geom."""
-
-FRICTION = 0.8
-"""Sliding friction of the ground, as in the robot's URDF; the robot's own shapes have priority."""
 
 Fidelity = Literal["exact", "coarse"]
 """How finely contacts are simulated: by step, friction cones and tolerance of the robot's model, or

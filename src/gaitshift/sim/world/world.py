@@ -13,10 +13,8 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
-from gaitshift.sim.sensors import POSE, TWIST, sense
-from gaitshift.sim.terrain import Fields, Terrain
-from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
-from gaitshift.sim.world.limits import (
+from gaitshift.sim.latency import Latency
+from gaitshift.sim.limits import (
     MOST_ANGLE,
     MOST_DISTANCE,
     MOST_FORCE,
@@ -24,11 +22,12 @@ from gaitshift.sim.world.limits import (
     check_unit,
     check_within,
 )
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
+from gaitshift.sim.sensors import POSE, TWIST, Sensors, sense
+from gaitshift.sim.terrain import Fields, Terrain
+from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
 from gaitshift.sim.world.model import Fidelity, build_model
-
-CONTACT_FORCE = 1.0
-"""A foot is down when its summed normal force exceeds this [N]; ours: 0.3 % of the weight, and the
-value of legged_gym."""
+from gaitshift.sim.world.randomisation import SAME, Models, Randomisation
 
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are posed before they are set on the ground [m]; ours."""
@@ -41,7 +40,8 @@ class World:
 
     Robots do not interact. With several terrains, robot i stands on terrain i mod K. Nothing moves
     between calls. `sensed` and `truth` always describe the present state, without delay (forces and
-    torques are those of the last physics step, which led to this state).
+    torques are those of the last physics step, which led to this state); `sensed` has the errors of
+    the sensors, and what it leads to may be late (`Latency`).
 
     A robot whose simulation diverges is set down in its stance where it was before the step, and
     `truth.diverged` marks it after that step. The first `MOST_KEPT` of them are logged by number.
@@ -55,7 +55,10 @@ class World:
         *,
         gains: str = "default",
         fidelity: Fidelity = "exact",
+        randomisation: Randomisation = SAME,
         threads: int = 0,
+        sensors: SensorConfig = PERFECT,
+        seed: int = 0,
     ) -> None:
         """Builds the world with all robots in their stance at the origin.
 
@@ -65,7 +68,10 @@ class World:
             n: number of robots.
             gains: preset of joint gains in `robot.gains`.
             fidelity: of the contacts.
+            randomisation: what `redraw` draws anew.
             threads: physics threads, 0 for all cores.
+            sensors: errors of the sensors and of the link to the joints.
+            seed: of these errors; starts and pushes with the same seed are independent of them.
         """
         if n < 1:
             raise GaitshiftError(f"robots must be 1 or more, got {n}")
@@ -73,7 +79,12 @@ class World:
         self.n = n
         self._gains = robot.gains_of(gains)
         self._threads = threads
+        self._randomisation = randomisation
+        self._models: Models | None = None
         self._stance = robot.stance_angles
+        measuring, sending = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
+        self._sensors = None if sensors.is_perfect else Sensors(sensors, robot, n, measuring)
+        self._link = sensors, sending
         self._history = History(n)
         self.divergences: list[Divergence] = []
         """The first `MOST_KEPT` divergences, for replay; may be cleared."""
@@ -101,15 +112,29 @@ class World:
         self.model = models[0]
         self._substeps = round(CONTROL_PERIOD / self.model.opt.timestep)
         batch = Batch(self.model, self.n, self._threads, True)
-        if len(models) > 1:
+        if self._randomisation.varies:
+            self._models = Models(models, self.n, self._randomisation, self._models)
+            batch.set_models(self._models.each)
+        elif len(models) > 1:
             batch.set_models([models[i % len(models)] for i in range(self.n)])
         self._batch = batch
         self._warned: Int[np.ndarray, "N 3"] = batch.warning[:, DIVERGED, 1]
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._ctrl, self._applied = batch.bind("ctrl"), batch.bind("qfrc_applied")
-        self._sensors, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
+        self._sensordata, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
+        config, rng = self._link
+        late = Latency(config, self.n, physics_step=self.model.opt.timestep, rng=rng)
+        self._latency = None if config.is_immediate else late
         if state is not None:
             self.set_state(*state)
+
+    def redraw(self, ids: Int[np.ndarray, " K"], rng: np.random.Generator) -> None:
+        """Draws what differs from robot to robot anew for these, without moving them.
+
+        Draws nothing where nothing differs.
+        """
+        if self._models is not None:
+            self._models.draw(ids, rng)
 
     def set_state(self, qpos: Float[np.ndarray, "N 19"], qvel: Float[np.ndarray, "N 18"]) -> None:
         """Puts all robots into these states; joint targets are their present angles.
@@ -176,7 +201,7 @@ class World:
             if given is not None:
                 self._qvel[ids, part] = given
         self._batch.forward(ids=ids, stage=int(mujoco.mjtStage.mjSTAGE_POS))
-        feet = self._feet(self._sensors[ids])
+        feet = self._feet(self._sensordata[ids])
         below = (feet[..., 2] - self._fields.height_at(feet[..., :2], ids)).min(axis=1)
         self._qpos[ids, 2] -= below
         self._settle(ids)
@@ -200,13 +225,16 @@ class World:
         """
         check_within("joint targets", "rad", target, MOST_ANGLE, names=self.robot.joint_names)
         self._history.add(self._qpos, self._qvel)
-        self._ctrl[:] = target
-        self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
+        link = self._latency
+        for steps, followed in [(self._substeps, target)] if link is None else link.send(target):
+            self._ctrl[:] = followed
+            self._batch.step(nstep=steps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
         if self._warned.any() or not np.abs(self._qvel).max() <= FASTEST:  # true for NaN
             in_range = np.abs(self._qvel).max(axis=1) <= FASTEST
             self._restart(np.flatnonzero(self._warned.any(axis=1) | ~in_range))
         else:
-            self._measure()
+            ideal = self._measure()
+            self.sensed = self._sensors.step(ideal, self.truth) if self._sensors else ideal
         return self.sensed, self.truth
 
     def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
@@ -231,15 +259,18 @@ class World:
             if len(self.divergences) < MOST_KEPT:
                 terrain = self.terrains[robot % len(self.terrains)]
                 self.divergences.append(self._history.divergence(robot, terrain))
-        before = self.truth.base_position_w[ids, :2], self.sensed.yaw[ids]
-        self.place(ids, xy=np.clip(before[0], -MOST_DISTANCE, MOST_DISTANCE), yaw=before[1])
+        xy = np.clip(self.truth.base_position_w[ids, :2], -MOST_DISTANCE, MOST_DISTANCE)
+        rotation = rotation_of(self.truth.base_quaternion_w[ids])
+        self.place(ids, xy=xy, yaw=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
+        if self._sensors:  # for the others the step goes on
+            self.sensed = self._sensors.step(self._measure(), self.truth)
         mask = np.zeros(self.n, dtype=bool)
         mask[ids] = True
         self.truth = replace(self.truth, diverged=mask)
 
-    def _measure(self) -> None:
-        """Updates `truth` and `sensed`."""
-        qpos, qvel, sensors = self._qpos.copy(), self._qvel.copy(), self._sensors.copy()
+    def _measure(self) -> Proprioception:
+        """Updates `truth`, and gives what perfect sensors show."""
+        qpos, qvel, sensors = self._qpos.copy(), self._qvel.copy(), self._sensordata.copy()
         feet, force = self._feet(sensors), sensors[:, 24:28]
         rotation = rotation_of(qpos[:, 3:POSE])
         self.truth = Privileged(
@@ -253,13 +284,13 @@ class World:
             body_contact=sensors[:, 28] > 0.0,
             diverged=np.zeros(self.n, dtype=bool),
         )
-        self.sensed = sense(
+        return sense(
             self.truth,
             rotation,
             qpos,
             qvel,
             self._torque.copy(),
-            contact=force > CONTACT_FORCE,
+            contact=self.truth.foot_contact,
             mass=self.robot.mass,
         )
 
@@ -275,7 +306,10 @@ class World:
         self._applied[ids] = 0.0
         self._history.forget(ids)
         self._batch.forward(ids=ids)
-        self._measure()
+        if self._latency:
+            self._latency.restart(ids, self._ctrl[ids])
+        ideal = self._measure()
+        self.sensed = self._sensors.restart(ids, ideal, self.truth) if self._sensors else ideal
 
     def _kept_state(
         self, terrains: tuple[Terrain, ...]

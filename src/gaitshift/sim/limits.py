@@ -1,4 +1,4 @@
-"""What may be asked of a world: finite values within physical ranges."""
+"""What may be asked of a simulator: finite values within physical ranges."""
 
 from collections.abc import Sequence
 
