@@ -27,8 +27,9 @@ from gaitshift.robot.state import (
     orientation_of,
     rotation_of,
 )
+from gaitshift.sim.push import PushConfig
 from gaitshift.sim.terrain import Terrain, flat
-from gaitshift.sim.world import PushConfig, World
+from gaitshift.sim.world import World
 
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
 ROBOTS, SECONDS, SETTLED, SEED = 32, 10.0, 200, 21
