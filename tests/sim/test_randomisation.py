@@ -72,12 +72,17 @@ def test_robots_slide_where_a_push_exceeds_friction():
     assert np.abs(slid[1]).max() < 0.15  # it leans on its legs
 
 
-def test_strength_scales_the_largest_torque():
+def test_strength_scales_the_limit_and_the_line_of_the_torque():
+    """At rest the drive cuts off at 80 N·m; at 12 rad/s the line has fallen to 120 · 3/15 = 24."""
     world = World(ANYMAL_B, GROUND, 6, randomisation=Randomisation(strength=(0.5, 1.5)))
     world.redraw(np.arange(6), np.random.default_rng(0))
-    sensed, _ = world.step(np.tile(STANCE + 2.0, (6, 1)))  # an error of 160 N·m
-    largest = np.abs(sensed.joint_torque).max(axis=1)
-    np.testing.assert_allclose(largest, 80.0 * drawn(world, "strength"), rtol=1e-9)
+    for robot, model in enumerate(world._models.each):
+        data = mujoco.MjData(model)
+        data.qpos[2], data.qpos[7:], data.qvel[6:12] = 3.0, STANCE, 12.0
+        data.ctrl[:] = STANCE + 3.0  # an error of 240 N·m
+        mujoco.mj_forward(model, data)
+        expected = drawn(world, "strength")[robot] * np.repeat([24.0, 80.0], 6)
+        np.testing.assert_allclose(data.actuator_force, expected, rtol=1e-9)
 
 
 def test_gains_scale_the_error_and_the_damping():

@@ -159,7 +159,9 @@ class Estimator:
             angular_velocity_b=sensed.need("angular_velocity_b", "the estimator"),
             joint_position=sensed.need("joint_position", "the estimator"),
         )
-        return after, replace(sensed, velocity_b=after.velocity_b)
+        estimated = replace(sensed, velocity_b=after.velocity_b)
+        vars(estimated)["rotation"] = sensed.rotation  # which the policy would compute again
+        return after, estimated
 
     @cached_property
     def _noise(self) -> Float[np.ndarray, "4 4"]:
@@ -232,7 +234,12 @@ class Estimation:
 
         One that is sensed stays. Without a specific force there is none.
         """
-        if sensed.velocity_b is not None or sensed.specific_force_b is None:
-            return sensed
-        self._state, sensed = self._estimator.step(self._state, sensed)
+        if sensed.velocity_b is None and sensed.specific_force_b is not None:
+            self._state, sensed = self._estimator.step(self._state, sensed)
+        return sensed
+
+    def seen(self, sensed: Proprioception) -> Proprioception:
+        """The same before any time has passed since the last call, or since a restart."""
+        if sensed.velocity_b is None and sensed.specific_force_b is not None:
+            return replace(sensed, velocity_b=self._state.velocity_b)
         return sensed

@@ -10,6 +10,7 @@ from typing import Any, cast, get_args, get_type_hints
 from gaitshift.data import known_names, located, tables_in
 from gaitshift.errors import GaitshiftError
 from gaitshift.learn.recipe import Recipe, Stage
+from gaitshift.sim.sensor_config import SensorConfig, sensor_preset
 
 
 def with_settings(recipe: Recipe, settings: Sequence[str] = (), file: Path | None = None) -> Recipe:
@@ -109,7 +110,10 @@ def _changed(part: Any, value: Any, where: str) -> Any:
 
 
 def _checked(old: Any, value: Any, where: str) -> Any:
-    """The value, if it is of the kind of the old one."""
+    """The value, if it is of the kind of the old one; sensors may be given by their preset."""
+    if isinstance(old, SensorConfig) and isinstance(value, str):
+        with located(where):
+            return sensor_preset(value)
     if is_dataclass(old) or _is_stages(old):
         raise GaitshiftError(f"{where} has settings of its own, got the single value {value!r}")
     if isinstance(old, tuple):

@@ -154,8 +154,8 @@ class Proprioception(Moving):
     angular_velocity_b: Float[np.ndarray, "*batch 3"] | None = None
     """Angular velocity of the base [rad/s]."""
     specific_force_b: Float[np.ndarray, "*batch 3"] | None = None
-    """Acceleration of the base origin less gravity, the mean over the step, as an accelerometer
-    shows it: (0, 0, 9.81) at rest on level ground [m/s²]."""
+    """Acceleration of the base origin less gravity, the mean over the step as an accelerometer
+    shows it, in the frame at its middle: (0, 0, 9.81) at rest on level ground [m/s²]."""
     time: Float[np.ndarray, " steps"] | float = 0.0
     """Time since the start [s]."""
     period: float = CONTROL_PERIOD

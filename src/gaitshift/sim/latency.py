@@ -20,7 +20,9 @@ class Latency:
     ) -> None:
         """Call `restart` for all robots before the first `send`; `physics_step` is in seconds."""
         self.config, self.n = config, n
-        self._physics_step, self._rng = physics_step, rng
+        self.rng = rng
+        """Of all draws; may be replaced."""
+        self._physics_step = physics_step
         self._substeps = round(CONTROL_PERIOD / physics_step)
         latest = int(np.ceil((config.delay[1] + config.jitter) / physics_step))
         kept = latest // self._substeps + 1
@@ -37,7 +39,7 @@ class Latency:
 
         Their delay is drawn anew.
         """
-        self._delay[ids] = self._rng.uniform(*self.config.delay, len(ids))
+        self._delay[ids] = self.rng.uniform(*self.config.delay, len(ids))
         self._held[ids] = held
         self._due[:, ids] = -1
 
@@ -60,9 +62,9 @@ class Latency:
 
     def _steps_until_due(self) -> Int[np.ndarray, " N"]:
         """Physics steps until new targets arrive, -1 where they never do."""
-        delay = self._delay + self.config.jitter * self._rng.uniform(-1.0, 1.0, self.n)
+        delay = self._delay + self.config.jitter * self.rng.uniform(-1.0, 1.0, self.n)
         steps = np.round(np.maximum(delay, 0.0) / self._physics_step).astype(np.int64)
-        return np.where(self._rng.random(self.n) < self.config.loss, -1, steps)
+        return np.where(self.rng.random(self.n) < self.config.loss, -1, steps)
 
     def _take(self, arrived: Bool[np.ndarray, "K N"]) -> bool:
         """Whether joints follow new targets, among those that have arrived."""

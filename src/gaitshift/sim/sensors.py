@@ -73,7 +73,8 @@ class Sensors:
     ) -> None:
         """All draws come from `rng`. Call `restart` for all robots before the first `step`."""
         self.config, self.n = config, n
-        self._rng = rng
+        self.rng = rng
+        """Of all draws; may be replaced."""
         self._legs, self._foot_radius = LegKinematics.of(robot), robot.foot_radius
         self._gyro_bias, self._force_bias = np.zeros((n, 3)), np.zeros((n, 3))
         self._orientation, self._true_orientation = np.zeros((n, 4)), np.zeros((n, 4))
@@ -97,8 +98,8 @@ class Sensors:
         config, count = self.config, len(ids)
         self._gyro_bias[ids] = self._noise(config.gyro_bias, count, 3)
         self._force_bias[ids] = self._noise(config.accelerometer_bias, count, 3)
-        self._missed[ids] = self._rng.random((count, 4)) < config.contact_missed
-        self._false[ids] = self._rng.random((count, 4)) < config.contact_false
+        self._missed[ids] = self.rng.random((count, 4)) < config.contact_missed
+        self._false[ids] = self.rng.random((count, 4)) < config.contact_false
         placed = truth.robots(ids)
         self._orientation[ids] = self._true_orientation[ids] = placed.base_quaternion_w
         rotation = rotation_of(placed.base_quaternion_w)
@@ -132,7 +133,9 @@ class Sensors:
         lasting = config.contact_error_time / period
         self._missed = self._last(self._missed, config.contact_missed, lasting)
         self._false = self._last(self._false, config.contact_false, lasting)
-        self._sensed = self._read(everyone, ideal, truth, gyro_error, force_b)
+        across = np.cross(0.5 * turn, force_b)  # to the frame half a step ago, to second order
+        mean_force_b = force_b + across + 0.5 * np.cross(0.5 * turn, across)
+        self._sensed = self._read(everyone, ideal, truth, gyro_error, mean_force_b)
         return self._sensed
 
     def _read(
@@ -172,7 +175,7 @@ class Sensors:
         return self._force_bias[ids] + noise
 
     def _noise(self, deviation: float, *shape: int) -> Float[np.ndarray, "K C"]:
-        return deviation * self._rng.standard_normal(shape)
+        return deviation * self.rng.standard_normal(shape)
 
     def _last(
         self, wrong: Bool[np.ndarray, "N 4"], share: float, steps: float
@@ -182,4 +185,4 @@ class Sensors:
         A Markov chain of two states, whose stationary distribution is the share.
         """
         begins = share / (1.0 - share) / steps
-        return self._rng.random(wrong.shape) < np.where(wrong, 1.0 - 1.0 / steps, begins)
+        return self.rng.random(wrong.shape) < np.where(wrong, 1.0 - 1.0 / steps, begins)

@@ -8,6 +8,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
 from gaitshift.sim.push import PushConfig
 from gaitshift.sim.reward import RewardConfig
+from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.world import Randomisation
 
 
@@ -21,6 +22,9 @@ class EnvConfig:
     """Disturbances; none by default."""
     randomisation: Randomisation = field(default_factory=Randomisation)
     """What differs from robot to robot; drawn anew at the start of each episode."""
+    sensors: SensorConfig = PERFECT
+    """Errors of the sensors and of the link to the joints. Where they give no velocity, policies
+    see an estimate."""
     observed: tuple[str, ...] = DEFAULT_SLICES
     """Slices of the observation, in order."""
     gains: str = "default"

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
+from gaitshift.control.estimator import Estimation
 from gaitshift.control.observation import GaitState, Observation
 from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
@@ -64,7 +65,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             gains=self.config.gains,
             randomisation=self.config.randomisation,
             threads=threads,
+            sensors=self.config.sensors,
         )
+        self._estimation = Estimation(robot, num_envs)
+        self._sensed = self._estimation.seen(self.world.sensed)
         self.curriculum = Curriculum()
         """The present difficulty; may be replaced between two steps."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
@@ -82,6 +86,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     ) -> tuple[Observations, dict[str, Any]]:
         """Restarts every episode. All later steps are the same, to the bit, for the same seed."""
         if seed is not None:
+            self.world.reseed(seed)
             self._start(np.random.default_rng(seed))
         self._restart(np.arange(self.num_envs))
         return self._observation(), {}
@@ -98,19 +103,22 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """One control step of 10 ms; `actions` scale to joint targets about the stance."""
         action, target = self.walker.target(actions)
         self.world.push(self._pusher.step())
-        sensed, truth = self.world.step(target)
+        _, truth = self.world.step(target)
+        self._estimation.restart(np.flatnonzero(truth.diverged))  # which are set down again
+        self._sensed = self._estimation.see(self.world.sensed)
+        ideal, contact = self.world.ideal, truth.foot_contact
         command, before = self._commander.command, self._state
-        self._state, step = self.walker.step(before, action, sensed, command)
+        self._state, step = self.walker.step(before, action, self._sensed, command)
         left, waited = before.machine_state, before.steps_in_state
         on_time = self.machine.punctuality(left, waited, self.machine.dwell_for(command.stride))
         asked = self.curriculum
         chatter, swing_share = self._swings.see(
-            left, step, sensed.contact, truth.clearance, asked.swing_factor
+            left, step, contact, truth.clearance, asked.swing_factor
         )
-        agreement = self.machine.agreement(step.state, sensed.contact)
+        agreement = self.machine.agreement(step.state, contact)
         terms = walk_reward(
             self.config.reward,
-            sensed,
+            ideal,
             truth,
             command,
             stance=self._stance,
@@ -167,7 +175,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         n = self.num_envs
         self._rng = rng
         self._pusher = Pusher(self.config.push, n, rng)
-        self._state = self.walker.begin(self.world.sensed)
+        self._state = self.walker.begin(self._sensed)
         self._swings = Swings(self.machine, n)
         self._age: Int[np.ndarray, " N"] = np.zeros(n, dtype=np.int64)
         self._commander = Commander(self.machine, self.config, n, rng)
@@ -198,12 +206,14 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             base_velocity_w=velocity,
         )
         self._pusher.clear(ids)
+        self._estimation.restart(ids)
         begun = self.walker.begin(self.world.sensed.robots(ids))
         self._state = self._state.with_robots(ids, begun)
         self._swings.restart(ids)
         self._age[ids] = 0
         if start is not None:
             self._set_going(moving, start, yaw[np.isin(ids, moving)])
+        self._sensed = self._estimation.seen(self.world.sensed)
         self._commander.restart(ids, yaw, self.curriculum.command_scale)
         self._update_command()
 
@@ -219,7 +229,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             return moving, None
         others = np.setdiff1d(np.arange(self.num_envs), ids)
         return moving, mix(
-            self.world.sensed,
+            self.world.ideal,
             self.world.truth,
             self._state,
             among=others,
@@ -273,11 +283,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _update_command(self) -> None:
         scale = self.curriculum.command_scale
-        self._commander.update(self._age, self.world.sensed.yaw, scale)
+        self._commander.update(self._age, self._sensed.yaw, scale)
 
     def commands(self) -> dict[str, Any]:
         """Nominal value and range of the forward-speed and stride-frequency commands."""
         return self._commander.ranges()
 
     def _observation(self) -> Observations:
-        return self.walker.observe(self._state, self.world.sensed, self._commander.command)
+        return self.walker.observe(self._state, self._sensed, self._commander.command)

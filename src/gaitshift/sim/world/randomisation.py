@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from gaitshift.errors import GaitshiftError
+from gaitshift.sim.simulator import FRICTION
 
 BASE = 1
 """Index of the base among the bodies of a model: the first after the world."""
@@ -40,8 +41,8 @@ ALLOWED: dict[str, Range] = {
 class Randomisation:
     """Ranges of what differs from robot to robot; by default nothing does."""
 
-    friction: Range | None = None
-    """Sliding friction between feet and ground; None: that of the robot's model."""
+    friction: Range = (FRICTION, FRICTION)
+    """Sliding friction between robot and ground; the default leaves that of the robot's model."""
     payload: Range = (0.0, 0.0)
     """Mass on the base, a point at the height of its centre of mass; below 0 the base is lighter
     [kg]."""
@@ -69,9 +70,8 @@ class Randomisation:
                 )
 
     def ranges(self) -> dict[str, Range]:
-        """The ranges that are given, by name."""
-        every = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in every.items() if value is not None}
+        """The ranges by name."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def varies(self) -> bool:
@@ -117,7 +117,7 @@ class Models:
     def _set(self, robot: int, drawn: dict[str, float]) -> None:
         self.drawn[robot] = drawn
         model, nominal = self.each[robot], self._nominal[robot]
-        if "friction" in drawn:
+        if self.config.friction != SAME.friction:
             model.geom_friction[self._own, 0] = drawn["friction"]
         model.geom_solref[self._own, 0] = drawn["softness"] * nominal.geom_solref[self._own, 0]
         model.actuator_gainprm[:, KP] = drawn["kp"] * nominal.actuator_gainprm[:, KP]

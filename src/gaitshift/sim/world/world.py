@@ -41,7 +41,7 @@ class World:
     Robots do not interact. With several terrains, robot i stands on terrain i mod K. Nothing moves
     between calls. `sensed` and `truth` always describe the present state, without delay (forces and
     torques are those of the last physics step, which led to this state); `sensed` has the errors of
-    the sensors, and what it leads to may be late (`Latency`).
+    the sensors, and what it leads to may be late (`Latency`); `ideal` is without errors.
 
     A robot whose simulation diverges is set down in its stance where it was before the step, and
     `truth.diverged` marks it after that step. The first `MOST_KEPT` of them are logged by number.
@@ -82,7 +82,7 @@ class World:
         self._randomisation = randomisation
         self._models: Models | None = None
         self._stance = robot.stance_angles
-        measuring, sending = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
+        measuring, sending = _streams(seed)
         self._sensors = None if sensors.is_perfect else Sensors(sensors, robot, n, measuring)
         self._link = sensors, sending
         self._history = History(n)
@@ -135,6 +135,15 @@ class World:
         """
         if self._models is not None:
             self._models.draw(ids, rng)
+
+    def reseed(self, seed: int) -> None:
+        """Begins the errors of sensors and link anew with this seed, from the next `place` on."""
+        measuring, sending = _streams(seed)
+        self._link = self._link[0], sending
+        if self._sensors:
+            self._sensors.rng = measuring
+        if self._latency:
+            self._latency.rng = sending
 
     def set_state(self, qpos: Float[np.ndarray, "N 19"], qvel: Float[np.ndarray, "N 18"]) -> None:
         """Puts all robots into these states; joint targets are their present angles.
@@ -269,7 +278,7 @@ class World:
         self.truth = replace(self.truth, diverged=mask)
 
     def _measure(self) -> Proprioception:
-        """Updates `truth`, and gives what perfect sensors show."""
+        """Updates `truth` and `ideal`, and gives the latter."""
         qpos, qvel, sensors = self._qpos.copy(), self._qvel.copy(), self._sensordata.copy()
         feet, force = self._feet(sensors), sensors[:, 24:28]
         rotation = rotation_of(qpos[:, 3:POSE])
@@ -284,7 +293,7 @@ class World:
             body_contact=sensors[:, 28] > 0.0,
             diverged=np.zeros(self.n, dtype=bool),
         )
-        return sense(
+        self.ideal = sense(
             self.truth,
             rotation,
             qpos,
@@ -293,6 +302,7 @@ class World:
             contact=self.truth.foot_contact,
             mass=self.robot.mass,
         )
+        return self.ideal
 
     def _feet(self, sensors: Float[np.ndarray, "K S"]) -> Float[np.ndarray, "K 4 3"]:
         """Lowest points of the feet [m]: the sensors give the centres of the spheres."""
@@ -320,3 +330,9 @@ class World:
         before, after = self._fields, Fields(terrains[: self.n], self.n)
         qpos[:, 2] += (after.height_at(feet) - before.height_at(feet)).max(axis=1)
         return qpos, qvel
+
+
+def _streams(seed: int) -> tuple[np.random.Generator, np.random.Generator]:
+    """Random generators of the sensors and of the link to the joints."""
+    measuring, sending = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
+    return measuring, sending
