@@ -91,7 +91,8 @@ def feed(env, monkeypatch):
     def fed(target):
         sensed, truth = step(target)
         env.world.sensed = replace(sensed, contact=contact.copy())
-        env.world.truth = replace(truth, clearance=np.where(contact, 0.0, 0.2))
+        force, clearance = np.where(contact, 70.0, 0.0), np.where(contact, 0.0, 0.2)
+        env.world.truth = replace(truth, foot_force=force, clearance=clearance)
         return env.world.sensed, env.world.truth
 
     monkeypatch.setattr(env.world, "step", fed)

@@ -16,7 +16,7 @@ from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import ACTION_LIMIT
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.state import Privileged
+from gaitshift.robot.state import Privileged, Proprioception
 from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.episodes import Commander, MixedStart, mix
 from gaitshift.sim.push import Pusher
@@ -68,7 +68,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             sensors=self.config.sensors,
         )
         self._estimation = Estimation(robot, num_envs)
-        self._sensed = self._estimation.seen(self.world.sensed)
         self.curriculum = Curriculum()
         """The present difficulty; may be replaced between two steps."""
         self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP, "render_modes": []}
@@ -105,10 +104,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self.world.push(self._pusher.step())
         _, truth = self.world.step(target)
         self._estimation.restart(np.flatnonzero(truth.diverged))  # which are set down again
-        self._sensed = self._estimation.see(self.world.sensed)
+        sensed = self._estimation.see(self.world.sensed)
         ideal, contact = self.world.ideal, truth.foot_contact
         command, before = self._commander.command, self._state
-        self._state, step = self.walker.step(before, action, self._sensed, command)
+        self._state, step = self.walker.step(before, action, sensed, command)
         left, waited = before.machine_state, before.steps_in_state
         on_time = self.machine.punctuality(left, waited, self.machine.dwell_for(command.stride))
         asked = self.curriculum
@@ -213,7 +212,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._age[ids] = 0
         if start is not None:
             self._set_going(moving, start, yaw[np.isin(ids, moving)])
-        self._sensed = self._estimation.seen(self.world.sensed)
         self._commander.restart(ids, yaw, self.curriculum.command_scale)
         self._update_command()
 
@@ -280,6 +278,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def _is_level(self) -> bool:
         """Whether the ground of all robots is level, and so has no border."""
         return all(terrain.is_flat for terrain in self.world.terrains)
+
+    @property
+    def _sensed(self) -> Proprioception:
+        """What the robots sense now, with an estimate of a velocity that they do not."""
+        return self._estimation.seen(self.world.sensed)
 
     def _update_command(self) -> None:
         scale = self.curriculum.command_scale
