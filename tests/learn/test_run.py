@@ -132,6 +132,19 @@ def test_a_run_that_was_killed_twice_at_other_steps_ends_with_the_same_bits(tmp_
     assert rows(folder) == rows(whole[0].folder)
 
 
+def test_a_killed_run_of_robots_that_differ_and_sense_with_errors_ends_with_the_same_bits(tmp_path):
+    env = replace(PRESETS["deployable"]().env, episode_steps=30, command_interval=11)
+    recipe = replace(TINY, env=env)
+    unbroken, broken = create(tmp_path / "whole", recipe=recipe), tmp_path / "broken"
+    unbroken.train()
+    with pytest.raises(KilledError):
+        create(broken, recipe=recipe).train(kill_at(4))
+    run = Run.resume(broken)
+    run.train()
+    assert same_bits(weights(run), weights(unbroken))
+    assert rows(broken) == rows(unbroken.folder)
+
+
 def test_the_policy_of_every_checkpoint_is_judged_once_though_the_run_was_killed(tmp_path):
     """Killed between checkpoints 2 and 4, after a verdict on a policy that was then lost."""
     judged = []

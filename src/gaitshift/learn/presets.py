@@ -1,9 +1,11 @@
-"""Recipes by name: the default, the earlier ones of the shipped policies, and the paper's."""
+"""Recipes by name: the default, earlier ones, one for a robot that exists, and the paper's."""
 
 from dataclasses import replace
 
 from gaitshift.learn.recipe import POLISH, ROUGH, PpoConfig, Recipe, Stage
 from gaitshift.sim.env import EnvConfig
+from gaitshift.sim.sensor_config import ANYMAL
+from gaitshift.sim.world import Randomisation
 
 _EACH_MINI_BATCH = PpoConfig(adapts="mini_batch", epochs=5, desired_kl=0.01)
 """PPO as in rsl_rl."""
@@ -27,6 +29,25 @@ def two_stage() -> Recipe:
     settle, averaged = (share * total / ROUGH.iterations for share in (0.35, 0.24))
     last = replace(rough, settle=settle, averaged=averaged)
     return Recipe(ppo=_EACH_MINI_BATCH, stages=(Stage(name="flat", iterations=350), last))
+
+
+def deployable() -> Recipe:
+    """For a robot that exists: sensors like ANYmal's with delay, estimated velocity, many bodies.
+
+    Ranges are those in which the shipped policies shall walk, and somewhat more of friction.
+    """
+    bodies = Randomisation(
+        friction=(0.25, 1.25),
+        payload=(-5.0, 5.0),
+        payload_x=(-0.1, 0.1),
+        payload_y=(-0.05, 0.05),
+        strength=(0.8, 1.2),
+        kp=(0.75, 1.25),
+        kd=(0.5, 1.5),
+        softness=(1.0, 3.0),
+    )
+    link = replace(ANYMAL, name="deployable", delay=(0.0, 0.03))
+    return Recipe(env=EnvConfig(sensors=link, randomisation=bodies))
 
 
 def paper() -> Recipe:
@@ -65,6 +86,7 @@ PRESETS = {
     "default": Recipe,
     "three-stage": three_stage,
     "two-stage": two_stage,
+    "deployable": deployable,
     "paper": paper,
 }
 """Recipes by the name that `gaitshift train --preset` takes."""
