@@ -18,6 +18,7 @@ from gaitshift.lab.gait_analysis import (
     measure,
     name_gait,
 )
+from gaitshift.lab.gait_analysis.measure import stalled
 from gaitshift.lab.gait_analysis.naming import share_in_order
 from gaitshift.lab.gait_analysis.phase import Phases, axial_of, ideal_of, phase_errors
 from gaitshift.lab.gait_analysis.sample import steady
@@ -98,6 +99,16 @@ def test_saturation_is_the_share_of_joints_and_steps_at_the_motors_limit():
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=None)
     weak = replace(LIGHT, motor=replace(LIGHT.motor, torque_limit=30.0))
     assert measure(log, {"trot": TROT}, weak)["saturation"] == pytest.approx(1 / 24)
+
+
+def test_a_robot_stalls_whose_machine_waits_for_two_seconds():
+    """Robot 1 stands from 8.0 s on and counts at 10.1 s, unless it has fallen; robot 0 trots."""
+    for steps, fallen_from, share in ((1010, None, 0.5), (990, None, 0.0), (1010, 900, 0.0)):
+        log = trotting(speed=0.9, period=40, steps=steps, fallen_from=fallen_from)
+        log.machine_state[:800, 1] = np.arange(800) // 20 % 2
+        log.machine_state[800:, 1] = 0
+        assert stalled(log) == share
+    assert stalled(trotting(speed=0.9, period=40, steps=150, fallen_from=None)) is None
 
 
 def test_robots_count_until_their_fall_and_the_warm_up_does_not_count():
@@ -339,6 +350,7 @@ GOOD = {
     "phase_consistency": [1.0, 0.99, 0.98, 0.97],
     "duty_factor": [0.48, 0.47, 0.52, 0.50],
     "clearance": [0.06, 0.07, 0.08, 0.055],
+    "stalled": 0.004,
 }
 
 
@@ -363,6 +375,7 @@ def test_a_trot_within_all_limits_misses_none():
         ("phase_consistency", [1.0, 0.97, 0.97, 0.94], ("phase_consistency", "BR")),
         ("duty_factor", [0.5, 0.5, 0.54, 0.48], ("duty_asymmetry", "BL")),
         ("clearance", [0.049, 0.06, 0.06, 0.06], ("clearance", "FL")),
+        ("stalled", 0.03, ("stalled", None)),
     ],
 )
 def test_each_limit_is_missed_by_its_own_figure(figure, value, miss):

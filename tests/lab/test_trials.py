@@ -60,7 +60,7 @@ def tried(walk_file):
 def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
     (rows, figures, log), done = tried
     titles = [row.trial for row in rows]
-    assert len(set(titles)) == len(rows) == len(TRIALS) + GROUNDS + 7
+    assert len(set(titles)) == len(rows) == len(TRIALS) + GROUNDS + 8
     assert [title for title in titles if "perlin:0.20" in title]
     survival = [row for row in rows if row.trial.startswith("survival")]
     assert all(row.value == 1.0 for row in survival), "standing for 0.3 s is no feat"
@@ -165,7 +165,7 @@ def test_trials_are_printed_as_one_object_or_as_a_table(walk_file, tried, capsys
     monkeypatch.setattr("gaitshift.cli.evaluate.run_trials", lambda *_, **__: tried[0])
     main(["evaluate", str(walk_file), "--trials", "quick", "--json"])
     said = json.loads(capsys.readouterr().out)
-    assert len(said["trials"]) == len(TRIALS) + GROUNDS + 7
+    assert len(said["trials"]) == len(TRIALS) + GROUNDS + 8
     assert said["size"]["name"] == "quick"
     main(["evaluate", str(walk_file), "--trials", "quick"])
     table = capsys.readouterr().out

@@ -71,6 +71,21 @@ _NAMES = (
 )
 
 
+STALL = 2.0
+"""Time without a change of state after which a machine has stalled [s]; ours: two cycles of the
+slowest shipped gait."""
+
+
+def stalled(log: Log) -> Figure:
+    """Share of the robots on their feet at the end whose machine has stalled; None: too short."""
+    upright, steps = ~log.fallen[-1], round(STALL / Sample.of(log, 0.0).period)
+    if not upright.any() or len(log.time) <= steps:
+        return None
+    state, gait = (of[-steps - 1 :, upright] for of in (log.machine_state, log.gait))
+    same = (state == state[0]).all(axis=0) & (gait == gait[0]).all(axis=0)
+    return float(same.mean())
+
+
 def lateral_error(log: Log) -> Figure:
     """95th percentile over robots on their feet of their final distance from their line [m]."""
     upright = ~log.fallen[-1]
@@ -221,6 +236,8 @@ def measure(
     - `clearance` (4,) [m]: median over strides of the greatest height of the sole over the ground.
     - `flight_fraction`: share of steps with no foot down.
     - `lateral_error_p95` [m]: 95th percentile of the distance from the line, at the end.
+    - `stalled`: share of robots on their feet at the end whose machine has not changed its state
+      for 2 s: they stand.
     - `verdict`: `gait`, the name by the contacts alone, or "none"; `scores` of every known gait;
       `clean`, whether the name is that of the active gait and all its limits are met; `misses`,
       the limits that are not met.
@@ -239,6 +256,7 @@ def measure(
         **base_figures(sample, robot),
         **feet_figures(sample, machines),
         "lateral_error_p95": lateral_error(log),
+        "stalled": stalled(log),
     }
     gait = sample.gait()
     scores = gait_scores(sample, machines.values())

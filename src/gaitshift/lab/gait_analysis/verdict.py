@@ -31,6 +31,8 @@ class Limits:
     """Greatest difference of duty factor, left to right, of a gait that is its own mirror image."""
     clearance: float
     """Least height of each foot at the top of its swing [m]."""
+    stalled: float = 0.01
+    """Greatest share of robots that stand because their machine does not go on."""
 
 
 FIRST = Limits(
@@ -123,6 +125,7 @@ def checks(figures: Mapping[str, Any], machine: RewardMachine) -> tuple[Check, .
         _worst(limits, "phase_error", phase_errors(phase, machine), "at_most"),
         _worst(limits, "phase_consistency", figures["phase_consistency"], "at_least"),
         _worst(limits, "clearance", figures["clearance"], "at_least"),
+        _whole(limits, "stalled", figures["stalled"], "at_most"),
     ]
     if machine.mirrored_states() is not None:
         duty = figures["duty_factor"]
