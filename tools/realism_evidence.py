@@ -61,6 +61,15 @@ def _body(name: str, **ranges: float) -> Imperfection:
 _SEEN = {"measures_velocity": True, "delay": (0.0, 0.0), "jitter": 0.0, "loss": 0.0}
 """Changes of a preset that leave its noise alone."""
 
+_RIGHT = {"contact_missed": 0.0, "contact_false": 0.0}
+_CONTACTS = SensorConfig(
+    name="contacts",
+    contact_threshold=ANYMAL.contact_threshold,
+    contact_missed=ANYMAL.contact_missed,
+    contact_false=ANYMAL.contact_false,
+    contact_error_time=ANYMAL.contact_error_time,
+)
+
 TOGETHER = Randomisation(
     friction=(0.25, 1.0),
     payload=(-5.0, 5.0),
@@ -76,6 +85,10 @@ IMPERFECTIONS = (
     Imperfection(name="velocity estimated", sensors=SensorConfig(measures_velocity=False)),
     Imperfection(name="noise of anymal", sensors=replace(ANYMAL, **_SEEN)),
     Imperfection(name="noise of cheap", sensors=replace(CHEAP, **_SEEN)),
+    Imperfection(
+        name="noise of anymal, contacts right", sensors=replace(ANYMAL, **_SEEN, **_RIGHT)
+    ),
+    Imperfection(name="contact errors of anymal", sensors=_CONTACTS),
     Imperfection(name="delay 10 ms", sensors=_delayed(0.01)),
     Imperfection(name="delay 20 ms", sensors=_delayed(0.02)),
     Imperfection(name="delay 30 ms", sensors=_delayed(0.03)),
@@ -132,7 +145,8 @@ have the gait's name.
 
 - **velocity estimated**: perfect sensors, but the velocity comes from the
   [estimator](estimator.md). The presets of `--sensors` estimate it too.
-- **noise of …**: the noise of a preset, with the true velocity and without delay.
+- **noise of …**: the noise of a preset, with the true velocity and without delay. *contacts right*
+  and *contact errors* were added after the other runs, to find what deceives the condition.
 - **40 N·m**: what the drives of ANYmal B take as a command; the URDF has 80.
 - **body, all together**: friction 0.25 to 1, payload ± 5 kg, motors ± 20 %, kp ± 25 %, kd ± 50 %,
   contacts up to three times as soft, drawn for each robot.
@@ -143,7 +157,7 @@ have the gait's name.
 
 **There and back**: robots that shift to the bound on the noise and back behind it, without a fall
 and without another shift. **After**: from the beginning of the noise to the shift.
-**Too early**: shifts before the noise begins.
+**Too early**: robots that shift before the noise begins.
 
 This page is made by `python tools/realism_evidence.py`.
 """
@@ -191,16 +205,20 @@ def crossed(one: Imperfection) -> table.Row:
         if first is not None and first < NOISE_UNTIL:
             noticed += 1
             ways.append(first - NOISE_AT)
-    false = sum(s["x_m"] < NOISE_AT for summary in summaries for s in summary["switches"])
+    early = sum(any(s["x_m"] < NOISE_AT for s in one["switches"]) for one in summaries)
     return {
         "imperfection": one.name,
         "there_and_back": back,
         "survived": sum(summary["survived"] for summary in summaries),
         "noticed": noticed,
         "noticed_after_m": f"{np.mean(ways):.3f}" if ways else "",
-        "before_noise": false,
+        "before_noise": early,
         "crossings": CROSSINGS,
     }
+
+
+OF_ALL = ("none", "sensors anymal", "sensors cheap")
+"""Imperfections under which all gaits walk; the others are tried on the paper's."""
 
 
 def gait_names() -> tuple[str, ...]:
@@ -213,7 +231,7 @@ def missing() -> Iterator[tuple[Path, str, Imperfection]]:
     done = {(row["gait"], row["imperfection"]) for row in rows_of(GAITS)}
     for gait in gait_names():
         for one in IMPERFECTIONS:
-            if (gait, one.name) not in done:
+            if (gait, one.name) not in done and (gait in FIRST_GAITS or one.name in OF_ALL):
                 yield GAITS, gait, one
     crossings = {row["imperfection"] for row in rows_of(CONDITION)}
     for one in OF_SENSORS:
@@ -232,7 +250,7 @@ def page() -> str:
     if not any(missing()):
         cells = {(row["gait"], row["imperfection"]): row for row in rows_of(GAITS)}
         texts["answer"], texts["verdict"] = _answer(cells)
-        texts["gaits"], texts["condition"] = _gait_table(cells), _condition_table()
+        texts["gaits"], texts["condition"] = _gait_tables(cells), _condition_table()
     return TEXT.format(
         robots=ROBOTS,
         seconds=SECONDS,
@@ -256,9 +274,8 @@ def _breaks(cells: Cells, gait: str, name: str) -> bool:
 
 
 def _answer(cells: Cells) -> tuple[str, str]:
-    first = FIRST_GAITS[:3]
     broken = {
-        one.name: [gait for gait in first if _breaks(cells, gait, one.name)]
+        one.name: [gait for gait in FIRST_GAITS if _breaks(cells, gait, one.name)]
         for one in IMPERFECTIONS
         if "together" not in one.name
     }
@@ -268,7 +285,8 @@ def _answer(cells: Cells) -> tuple[str, str]:
     answer = (
         f"For trot, pace and bound: about {rest}. The rest of the list they bear, untrained. With "
         f"`--sensors anymal` {len(preset)} of {len(gait_names())} gaits survive and keep their "
-        "speed."
+        f"speed, but the default condition shifts too early in {_early('sensors anymal')} of "
+        f"{CROSSINGS} crossings: it takes false contacts for rough ground."
     )
     expected = {"friction 0.25", "friction 0.4", "kp 75 %", "delay 30 ms"}
     found = {name for name, gaits in broken.items() if gaits}
@@ -283,18 +301,27 @@ def _answer(cells: Cells) -> tuple[str, str]:
     return answer, verdict
 
 
-def _gait_table(cells: Cells) -> str:
-    lines: list[tuple[str, ...]] = []
-    for one in IMPERFECTIONS:
-        line = [one.name]
-        for gait in gait_names():
-            row = cells[gait, one.name]
-            speed = f"{float(row['speed_mean']):.2f}" if row["speed_mean"] else "–"
-            cell = f"{float(row['survival']):.2f}, {speed}"
-            cell = f"**{cell}**" if _breaks(cells, gait, one.name) else cell
-            line.append(cell if row["named"] == gait else f"{cell} ×")
-        lines.append(tuple(line))
-    return table.markdown(("imperfection", *gait_names()), lines)
+def _early(name: str) -> int:
+    """Crossings under an imperfection with a shift before the noise."""
+    (row,) = (row for row in rows_of(CONDITION) if row["imperfection"] == name)
+    return int(row["before_noise"])
+
+
+def _gait_tables(cells: Cells) -> str:
+    """All imperfections of the paper's gaits, then the presets of all gaits."""
+    names = [one.name for one in IMPERFECTIONS]
+    first = [(name, *(_cell(cells, gait, name) for gait in FIRST_GAITS)) for name in names]
+    each = [(gait, *(_cell(cells, gait, name) for name in OF_ALL)) for gait in gait_names()]
+    tables = table.markdown(("imperfection", *FIRST_GAITS), first)
+    return f"{tables}\n\n{table.markdown(('gait', *OF_ALL), each)}"
+
+
+def _cell(cells: Cells, gait: str, name: str) -> str:
+    row = cells[gait, name]
+    speed = f"{float(row['speed_mean']):.2f}" if row["speed_mean"] else "–"
+    cell = f"{float(row['survival']):.2f}, {speed}"
+    cell = f"**{cell}**" if _breaks(cells, gait, name) else cell
+    return cell if row["named"] == gait else f"{cell} ×"
 
 
 def _condition_table() -> str:
