@@ -177,9 +177,21 @@ def pause(page):
 
 
 def begin_recording(page):
-    """And lets two seconds go."""
+    """And lets two seconds go, from when the page tells that it records."""
+    from playwright.sync_api import TimeoutError as NotSeenError  # may not be installed
+
     page.get_by_text("Recording", exact=True).click()
-    page.get_by_role("button", name="record", exact=True).click()
+    record, save = (
+        page.get_by_role("button", name=name, exact=True) for name in ("record", "end and save")
+    )
+    for _ in range(4):  # on a busy machine the browser may lose a click
+        record.click()
+        try:
+            save.wait_for(timeout=60_000)
+            break
+        except NotSeenError:
+            continue
+    assert save.is_visible()
     begun = status(page)[2]
     wait_until(lambda: status(page)[2] > begun + 2.0)
 
