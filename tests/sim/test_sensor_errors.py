@@ -290,11 +290,11 @@ def test_a_robot_that_restarts_gets_another_unit_and_the_others_keep_what_they_s
     world = robots(4, sensors=replace(ANYMAL, gyro_noise=0.0, gyro_bias_walk=0.0))
     run(world, wild_targets(4, 10))
     before = world.sensed
-    bias = before.angular_velocity_b - world._measure().angular_velocity_b
+    bias = before.angular_velocity_b - world.ideal.angular_velocity_b
     ids, others = np.array([1, 3]), np.array([0, 2])
     world.place(ids, xy=np.ones((2, 2)), yaw=np.array([0.5, -1.0]))
     assert_same_bits([world.sensed.robots(others)], [before.robots(others)])
-    after = world.sensed.angular_velocity_b - world._measure().angular_velocity_b
+    after = world.sensed.angular_velocity_b - world.ideal.angular_velocity_b
     np.testing.assert_allclose(after[others], bias[others], rtol=0, atol=1e-12)
     assert (np.abs(after - bias)[ids] > 1e-7).all()
     np.testing.assert_allclose(world.sensed.yaw[ids], [0.5, -1.0], rtol=0, atol=1e-12)

@@ -237,6 +237,12 @@ class Privileged(Moving):
     other fields describe it after it was set down again."""
 
     @cached_property
+    def yaw(self) -> Float[np.ndarray, "*batch"]:
+        """Heading of the body's x axis about the world's z axis, in (-π, π] [rad]."""
+        rotation = rotation_of(self.base_quaternion_w)
+        return np.arctan2(rotation[..., 1, 0], rotation[..., 0, 0])
+
+    @cached_property
     def foot_contact(self) -> Bool[np.ndarray, "*batch 4"]:
         """Whether each foot bears on the ground."""
         return self.foot_force > CONTACT_FORCE

@@ -8,12 +8,11 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
 from gaitshift.robot.urdf import urdf_of
 from gaitshift.sim.bullet.body import EXTRA, PHYSICS_STEP, Body, Motion
-from gaitshift.sim.latency import Latency
+from gaitshift.sim.hardware import Hardware
 from gaitshift.sim.limits import (
     MOST_ANGLE,
     MOST_DISTANCE,
@@ -21,8 +20,8 @@ from gaitshift.sim.limits import (
     MOST_YAW,
     check_within,
 )
+from gaitshift.sim.measurement import POSE, TWIST, Feet, measured
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
-from gaitshift.sim.sensors import POSE, TWIST, Sensors, sense
 from gaitshift.sim.terrain import Fields, Terrain
 
 FASTEST = 99.0
@@ -30,8 +29,6 @@ FASTEST = 99.0
 
 MOST_ROBOTS = 256
 """Most robots of a world; ours: each has a client of its own, which takes 45 MB."""
-
-_SUBSTEPS = round(CONTROL_PERIOD / PHYSICS_STEP)
 
 
 class BulletWorld:
@@ -77,10 +74,8 @@ class BulletWorld:
         self._gains = robot.gains_of(gains)
         urdf = _urdf(robot)
         self._bodies = [Body(urdf, self.terrains[i % len(self.terrains)]) for i in range(n)]
-        measuring, sending = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
-        late = Latency(sensors, n, physics_step=PHYSICS_STEP, rng=sending)
-        self._latency = None if sensors.is_immediate else late
-        self._sensors = None if sensors.is_perfect else Sensors(sensors, robot, n, measuring)
+        self._hardware = Hardware(sensors, robot, n, seed=seed)
+        self._hardware.run_at(PHYSICS_STEP)
         self._force_w = np.zeros((n, 3))
         self._torque = np.zeros((n, 12))
         self._angles, self._speeds = np.zeros((n, 12)), np.zeros((n, 12))
@@ -137,10 +132,8 @@ class BulletWorld:
         self._angles[ids], self._speeds[ids] = angles, speeds
         self._force_w[ids], self._torque[ids] = 0.0, 0.0
         self._foot_force[ids], self._touches[ids] = 0.0, False
-        if self._latency:
-            self._latency.restart(ids, angles)
         ideal = self._measure()
-        self.sensed = self._sensors.restart(ids, ideal, self.truth) if self._sensors else ideal
+        self.sensed = self._hardware.restart(ids, ideal, self.truth, angles)
 
     def push(self, force_w: Float[np.ndarray, "N 3"]) -> None:
         """Forces on the base origins, world frame [N], until the next call or `place`.
@@ -161,14 +154,13 @@ class BulletWorld:
         """
         check_within("joint targets", "rad", target, MOST_ANGLE, names=self.robot.joint_names)
         before = self.truth
-        link = self._latency
-        for steps, followed in [(_SUBSTEPS, target)] if link is None else link.send(target):
+        for steps, followed in self._hardware.followed(target):
             for _ in range(steps):
                 self._advance(followed)
         for i, body in enumerate(self._bodies):
             self._foot_force[i], self._touches[i] = body.contacts()
         ideal = self._measure()
-        self.sensed = self._sensors.step(ideal, self.truth) if self._sensors else ideal
+        self.sensed = self._hardware.sense(ideal, self.truth)
         self._restart_diverged(before)
         return self.sensed, self.truth
 
@@ -201,7 +193,6 @@ class BulletWorld:
         motions = [body.motion() for body in self._bodies]
         position, quaternion, velocity, turning = map(np.array, zip(*motions, strict=True))
         quaternion = np.roll(quaternion, 1, axis=1)
-        rotation = rotation_of(quaternion)
         feet, foot_velocity = (
             np.array(part) for part in zip(*(body.feet() for body in self._bodies), strict=True)
         )
@@ -209,42 +200,29 @@ class BulletWorld:
         qpos, qvel = np.empty((self.n, POSE + 12)), np.empty((self.n, TWIST + 12))
         qpos[:, :3], qpos[:, 3:POSE], qpos[:, POSE:] = position, quaternion, self._angles
         qvel[:, :3], qvel[:, TWIST:] = velocity, self._speeds
-        self._turning = np.einsum("nij,ni->nj", rotation, turning)
-        qvel[:, 3:TWIST] = self._turning
-        self.truth = Privileged(
-            base_position_w=position,
-            base_quaternion_w=quaternion,
-            velocity_b=np.einsum("nij,ni->nj", rotation, velocity),
-            foot_position_w=feet,
-            foot_velocity_w=foot_velocity,
-            foot_force=self._foot_force.copy(),
-            clearance=feet[..., 2] - self._fields.height_at(feet[..., :2]),
+        qvel[:, 3:TWIST] = np.einsum("nij,ni->nj", rotation_of(quaternion), turning)
+        self.truth, ideal = measured(
+            self.robot,
+            self._fields,
+            qpos=qpos,
+            qvel=qvel,
+            torque=self._torque.copy(),
+            feet=Feet(feet, foot_velocity, self._foot_force.copy()),
             body_contact=self._touches.copy(),
-            diverged=np.zeros(self.n, dtype=bool),
         )
-        return sense(
-            self.truth,
-            rotation,
-            qpos,
-            qvel,
-            self._torque.copy(),
-            contact=self.truth.foot_contact,
-            mass=self.robot.mass,
-        )
+        self._fastest = np.abs(qvel).max(axis=1)
+        return ideal
 
     def _restart_diverged(self, before: Privileged) -> None:
         """Sets robots down where they were if they are too fast or their state is no number."""
-        turning = self._turning
-        moving = np.concatenate((self.truth.velocity_b, turning, self._speeds), axis=1)
-        ids = np.flatnonzero(~(np.abs(moving).max(axis=1) <= FASTEST))
+        ids = np.flatnonzero(~(self._fastest <= FASTEST))
         if not ids.size:
             return
         terrains = self.terrains
         for robot in ids.tolist():  # a client whose state is no number stays so
             self._bodies[robot] = Body(_urdf(self.robot), terrains[robot % len(terrains)])
         xy = np.clip(before.base_position_w[ids, :2], -MOST_DISTANCE, MOST_DISTANCE)
-        rotation = rotation_of(before.base_quaternion_w[ids])
-        self.place(ids, xy=xy, yaw=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
+        self.place(ids, xy=xy, yaw=before.yaw[ids])
         mask = np.zeros(self.n, dtype=bool)
         mask[ids] = True
         self.truth = replace(self.truth, diverged=mask)

@@ -1,5 +1,6 @@
 """Simulations that diverge: what shows it, and the last second before it, for replay."""
 
+import logging
 from dataclasses import dataclass
 
 import mujoco
@@ -7,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from gaitshift.robot.command import CONTROL_PERIOD
-from gaitshift.sim.sensors import POSE, TWIST
+from gaitshift.sim.measurement import POSE, TWIST
 from gaitshift.sim.terrain import Terrain
 
 DIVERGED = slice(int(mujoco.mjtWarning.mjWARN_BADQPOS), int(mujoco.mjtWarning.mjWARN_BADQACC) + 1)
@@ -23,6 +24,9 @@ MOST_KEPT = 8
 
 _STEPS = round(1.0 / CONTROL_PERIOD)
 """Length of what is kept: one second [control steps]."""
+
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,6 +47,9 @@ class History:
     """The states of N robots in the last second: a ring, in single precision."""
 
     def __init__(self, n: int) -> None:
+        self.divergences: list[Divergence] = []
+        """The first `MOST_KEPT` divergences; may be cleared."""
+        self._logged = 0
         self._states: Float32[np.ndarray, "T N 37"] = np.zeros(
             (_STEPS, n, POSE + TWIST + 24), dtype=np.float32
         )
@@ -59,13 +66,22 @@ class History:
         """Robots that are placed anew have no past."""
         self._since[ids] = self._added
 
-    def steps_of(self, robot: int) -> int:
-        """States added since the robot was placed."""
-        return self._added - int(self._since[robot])
+    def keep(self, robot: int, terrain: Terrain) -> None:
+        """Logs and keeps the divergence of a robot on its terrain, if it is one of the first."""
+        steps = self._added - int(self._since[robot])
+        if self._logged < MOST_KEPT:
+            self._logged += 1
+            _LOG.warning(
+                "robot %d: its simulation diverged after %.2f s; it counts as failed and is "
+                "restarted",
+                robot,
+                steps * CONTROL_PERIOD,
+            )
+        if len(self.divergences) < MOST_KEPT:
+            self.divergences.append(self._divergence(robot, terrain, min(steps, _STEPS)))
 
-    def divergence(self, robot: int, terrain: Terrain) -> Divergence:
-        """The last second of a robot, or what there is since it was placed."""
-        steps = min(self.steps_of(robot), _STEPS)
+    def _divergence(self, robot: int, terrain: Terrain, steps: int) -> Divergence:
+        """The last steps of a robot."""
         entries = np.arange(self._added - steps, self._added) % _STEPS
         states = self._states[entries, robot]
         return Divergence(

@@ -1,6 +1,5 @@
 """N robots stepped on all cores: joint targets in, proprioception and privileged state out."""
 
-import logging
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -10,10 +9,9 @@ from jaxtyping import Float, Int
 from mujoco.batch import Batch
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.robot.description import Robot
-from gaitshift.robot.state import Privileged, Proprioception, rotation_of, turned
-from gaitshift.sim.latency import Latency
+from gaitshift.robot.state import Privileged, Proprioception, turned
+from gaitshift.sim.hardware import Hardware
 from gaitshift.sim.limits import (
     MOST_ANGLE,
     MOST_DISTANCE,
@@ -22,17 +20,15 @@ from gaitshift.sim.limits import (
     check_unit,
     check_within,
 )
+from gaitshift.sim.measurement import POSE, TWIST, Feet, measured
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
-from gaitshift.sim.sensors import POSE, TWIST, Sensors, sense
 from gaitshift.sim.terrain import Fields, Terrain
-from gaitshift.sim.world.divergence import DIVERGED, FASTEST, MOST_KEPT, Divergence, History
+from gaitshift.sim.world.divergence import DIVERGED, FASTEST, Divergence, History
 from gaitshift.sim.world.model import Fidelity, build_model
 from gaitshift.sim.world.randomisation import SAME, Models, Randomisation
 
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are posed before they are set on the ground [m]; ours."""
-
-_LOG = logging.getLogger(__name__)
 
 
 class World:
@@ -41,10 +37,10 @@ class World:
     Robots do not interact. With several terrains, robot i stands on terrain i mod K. Nothing moves
     between calls. `sensed` and `truth` always describe the present state, without delay (forces and
     torques are those of the last physics step, which led to this state); `sensed` has the errors of
-    the sensors, and what it leads to may be late (`Latency`); `ideal` is without errors.
+    the sensors, and what it leads to may be late (`Hardware`); `ideal` is without errors.
 
     A robot whose simulation diverges is set down in its stance where it was before the step, and
-    `truth.diverged` marks it after that step. The first `MOST_KEPT` of them are logged by number.
+    `truth.diverged` marks it after that step. The first of them are logged by number (`History`).
     """
 
     def __init__(
@@ -82,13 +78,8 @@ class World:
         self._randomisation = randomisation
         self._models: Models | None = None
         self._stance = robot.stance_angles
-        measuring, sending = _streams(seed)
-        self._sensors = None if sensors.is_perfect else Sensors(sensors, robot, n, measuring)
-        self._link = sensors, sending
+        self._hardware = Hardware(sensors, robot, n, seed=seed)
         self._history = History(n)
-        self.divergences: list[Divergence] = []
-        """The first `MOST_KEPT` divergences, for replay; may be cleared."""
-        self._told = 0
         self.terrains: tuple[Terrain, ...] = ()
         self.set_terrain(terrain, fidelity)
         self.place(np.arange(n), xy=np.zeros((n, 2)), yaw=np.zeros(n))
@@ -110,7 +101,7 @@ class World:
             build_model(self.robot, self._gains, ground, fidelity) for ground in self.terrains
         ]
         self.model = models[0]
-        self._substeps = round(CONTROL_PERIOD / self.model.opt.timestep)
+        self._hardware.run_at(self.model.opt.timestep)
         batch = Batch(self.model, self.n, self._threads, True)
         if self._randomisation.varies:
             self._models = Models(models, self.n, self._randomisation, self._models)
@@ -122,9 +113,6 @@ class World:
         self._qpos, self._qvel = batch.bind("qpos"), batch.bind("qvel")
         self._ctrl, self._applied = batch.bind("ctrl"), batch.bind("qfrc_applied")
         self._sensordata, self._torque = batch.bind("sensordata"), batch.bind("actuator_force")
-        config, rng = self._link
-        late = Latency(config, self.n, physics_step=self.model.opt.timestep, rng=rng)
-        self._latency = None if config.is_immediate else late
         if state is not None:
             self.set_state(*state)
 
@@ -138,12 +126,7 @@ class World:
 
     def reseed(self, seed: int) -> None:
         """Begins the errors of sensors and link anew with this seed, from the next `place` on."""
-        measuring, sending = _streams(seed)
-        self._link = self._link[0], sending
-        if self._sensors:
-            self._sensors.rng = measuring
-        if self._latency:
-            self._latency.rng = sending
+        self._hardware.reseed(seed)
 
     def set_state(self, qpos: Float[np.ndarray, "N 19"], qvel: Float[np.ndarray, "N 18"]) -> None:
         """Puts all robots into these states; joint targets are their present angles.
@@ -234,16 +217,15 @@ class World:
         """
         check_within("joint targets", "rad", target, MOST_ANGLE, names=self.robot.joint_names)
         self._history.add(self._qpos, self._qvel)
-        link = self._latency
-        for steps, followed in [(self._substeps, target)] if link is None else link.send(target):
+        for steps, followed in self._hardware.followed(target):
             self._ctrl[:] = followed
             self._batch.step(nstep=steps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
         if self._warned.any() or not np.abs(self._qvel).max() <= FASTEST:  # true for NaN
             in_range = np.abs(self._qvel).max(axis=1) <= FASTEST
             self._restart(np.flatnonzero(self._warned.any(axis=1) | ~in_range))
         else:
-            ideal = self._measure()
-            self.sensed = self._sensors.step(ideal, self.truth) if self._sensors else ideal
+            self._measure()
+            self.sensed = self._hardware.sense(self.ideal, self.truth)
         return self.sensed, self.truth
 
     def state(self) -> tuple[Float[np.ndarray, "N 19"], Float[np.ndarray, "N 18"]]:
@@ -256,53 +238,35 @@ class World:
         In `truth`, which then describes the restarted robots, `diverged` is true for them.
         """
         for robot in map(int, ids):
-            steps = self._history.steps_of(robot)
-            if self._told < MOST_KEPT:
-                self._told += 1
-                _LOG.warning(
-                    "robot %d: its simulation diverged after %.2f s; it counts as failed and is "
-                    "restarted",
-                    robot,
-                    steps * CONTROL_PERIOD,
-                )
-            if len(self.divergences) < MOST_KEPT:
-                terrain = self.terrains[robot % len(self.terrains)]
-                self.divergences.append(self._history.divergence(robot, terrain))
+            self._history.keep(robot, self.terrains[robot % len(self.terrains)])
         xy = np.clip(self.truth.base_position_w[ids, :2], -MOST_DISTANCE, MOST_DISTANCE)
-        rotation = rotation_of(self.truth.base_quaternion_w[ids])
-        self.place(ids, xy=xy, yaw=np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
-        if self._sensors:  # for the others the step goes on
-            self.sensed = self._sensors.step(self._measure(), self.truth)
+        self.place(ids, xy=xy, yaw=self.truth.yaw[ids])
+        self.sensed = self._hardware.sense(self.ideal, self.truth)  # for the others time goes on
         mask = np.zeros(self.n, dtype=bool)
         mask[ids] = True
         self.truth = replace(self.truth, diverged=mask)
 
-    def _measure(self) -> Proprioception:
-        """Updates `truth` and `ideal`, and gives the latter."""
-        qpos, qvel, sensors = self._qpos.copy(), self._qvel.copy(), self._sensordata.copy()
-        feet, force = self._feet(sensors), sensors[:, 24:28]
-        rotation = rotation_of(qpos[:, 3:POSE])
-        self.truth = Privileged(
-            base_position_w=qpos[:, :3],
-            base_quaternion_w=qpos[:, 3:POSE],
-            velocity_b=np.einsum("nij,ni->nj", rotation, qvel[:, :3]),
-            foot_position_w=feet,
-            foot_velocity_w=sensors[:, 12:24].reshape(-1, 4, 3),
-            foot_force=force,
-            clearance=feet[..., 2] - self._fields.height_at(feet[..., :2]),
+    @property
+    def divergences(self) -> list[Divergence]:
+        """The first divergences, for replay; may be cleared."""
+        return self._history.divergences
+
+    def _measure(self) -> None:
+        """Updates `truth` and `ideal`."""
+        sensors = self._sensordata.copy()
+        self.truth, self.ideal = measured(
+            self.robot,
+            self._fields,
+            qpos=self._qpos.copy(),
+            qvel=self._qvel.copy(),
+            torque=self._torque.copy(),
+            feet=Feet(
+                lowest_w=self._feet(sensors),
+                velocity_w=sensors[:, 12:24].reshape(-1, 4, 3),
+                force=sensors[:, 24:28],
+            ),
             body_contact=sensors[:, 28] > 0.0,
-            diverged=np.zeros(self.n, dtype=bool),
         )
-        self.ideal = sense(
-            self.truth,
-            rotation,
-            qpos,
-            qvel,
-            self._torque.copy(),
-            contact=self.truth.foot_contact,
-            mass=self.robot.mass,
-        )
-        return self.ideal
 
     def _feet(self, sensors: Float[np.ndarray, "K S"]) -> Float[np.ndarray, "K 4 3"]:
         """Lowest points of the feet [m]: the sensors give the centres of the spheres."""
@@ -316,10 +280,8 @@ class World:
         self._applied[ids] = 0.0
         self._history.forget(ids)
         self._batch.forward(ids=ids)
-        if self._latency:
-            self._latency.restart(ids, self._ctrl[ids])
-        ideal = self._measure()
-        self.sensed = self._sensors.restart(ids, ideal, self.truth) if self._sensors else ideal
+        self._measure()
+        self.sensed = self._hardware.restart(ids, self.ideal, self.truth, self._ctrl[ids])
 
     def _kept_state(
         self, terrains: tuple[Terrain, ...]
@@ -330,9 +292,3 @@ class World:
         before, after = self._fields, Fields(terrains[: self.n], self.n)
         qpos[:, 2] += (after.height_at(feet) - before.height_at(feet)).max(axis=1)
         return qpos, qvel
-
-
-def _streams(seed: int) -> tuple[np.random.Generator, np.random.Generator]:
-    """Random generators of the sensors and of the link to the joints."""
-    measuring, sending = map(np.random.default_rng, np.random.SeedSequence(seed).spawn(2))
-    return measuring, sending
