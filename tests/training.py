@@ -8,6 +8,7 @@ import torch
 from gaitshift.gait import gaits
 from gaitshift.learn.recipe import PpoConfig, Recipe, Stage
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 from gaitshift.sim.env import EnvConfig
 
 TROT = gaits.load("trot")
@@ -68,7 +69,8 @@ def kill_at(iteration, error=KilledError):
 
 
 def create(folder, *, seed=7, recipe=TINY, **options):
-    return Run.create(folder, TROT, recipe, seed=seed, command="gaitshift train trot", **options)
+    config = RunConfig(machine=TROT, recipe=recipe, seed=seed, command="gaitshift train trot")
+    return Run.create(folder, config, **options)
 
 
 def rows(folder):

@@ -75,7 +75,7 @@ def begin(tmp_path, ports):
 
 
 class Peer:
-    """The other side of a command: a socket that sends what it is told to, until it is told not."""
+    """The other side of a command: a socket that sends datagrams until it is silenced."""
 
     def __init__(self, ports, make):
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -10,11 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gaitshift.control.deployment import datagram
 from gaitshift.control.deployment.datagram import (
     Command,
     Decision,
-    Malformed,
     Sensors,
     decode_command,
     decode_sensors,
@@ -22,6 +20,12 @@ from gaitshift.control.deployment.datagram import (
     encode_sensors,
 )
 from gaitshift.control.deployment.inbox import Inbox
+from gaitshift.control.deployment.layout import (
+    COMMAND_LAYOUT,
+    RANGES,
+    SENSORS_LAYOUT,
+    Malformed,
+)
 from gaitshift.errors import GaitshiftError
 from lockstep import standing, standing_sensed, trotting
 
@@ -137,7 +141,7 @@ def resealed(data, at, part):
 
 def places(layout):
     """Every number of a datagram: name, place, size, greatest magnitude."""
-    for name, most in datagram.RANGES.items():
+    for name, most in RANGES.items():
         if name in layout.names:
             kind, at = layout.fields[name][:2]
             for index in range(int(np.prod(kind.shape, dtype=int))):
@@ -148,11 +152,11 @@ def places(layout):
 def test_every_number_out_of_range_is_found_whatever_its_crc(wrong):
     sensors = standing(1, 0.0, specific_force_b=np.zeros((1, 3)))
     for data, layout, decode in (
-        (sensors, datagram.SENSORS_LAYOUT, decode_sensors),
-        (encode_command(COMMAND), datagram.COMMAND_LAYOUT, decode_command),
+        (sensors, SENSORS_LAYOUT, decode_sensors),
+        (encode_command(COMMAND), COMMAND_LAYOUT, decode_command),
     ):
         found = list(places(layout))
-        assert len(found) == (36 + 12 + 4 + 9 if layout == datagram.SENSORS_LAYOUT else 12 + 2 + 5)
+        assert len(found) == (36 + 12 + 4 + 9 if layout == SENSORS_LAYOUT else 12 + 2 + 5)
         for name, at, most in found:
             value = wrong * most if np.isfinite(wrong) else wrong
             changed = resealed(data, at, struct.pack("<d", value))
@@ -180,7 +184,7 @@ def test_a_header_that_is_wrong_is_found_whatever_its_crc(at, part):
 
 
 def test_a_name_that_cannot_be_printed_and_negative_gains_are_found():
-    data, at = encode_command(COMMAND), datagram.COMMAND_LAYOUT.fields
+    data, at = encode_command(COMMAND), COMMAND_LAYOUT.fields
     for name, part in (
         ("gait", b"tr\nt"),
         ("gait", b"\xff"),

@@ -16,6 +16,7 @@ from gaitshift.lab.reproduction.plan import ABLATIONS, AS_IN_THE_PAPER, REFERENC
 from gaitshift.lab.reproduction.results import EarlierRuns, Results, Seeds
 from gaitshift.learn.presets import paper
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 from gaitshift.show.plots.reproduction import Landmarks, comparison_curves, reward_curves
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
@@ -136,7 +137,8 @@ def test_a_run_that_goes_on_has_the_factor_of_its_iteration(tmp_path):
             if broken and row["iteration"] == 2:
                 raise KeyboardInterrupt
 
-        run = Run.create(folder, job.machine, recipe, seed=1, command="test")
+        config = RunConfig(machine=job.machine, recipe=recipe, seed=1, command="test")
+        run = Run.create(folder, config)
         if broken:
             with pytest.raises(KeyboardInterrupt):
                 run.train(report)

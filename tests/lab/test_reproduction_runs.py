@@ -22,6 +22,7 @@ from gaitshift.lab.reproduction.results import Results
 from gaitshift.lab.reproduction.training import FAILED, is_over, train, train_all
 from gaitshift.learn.learner import DivergedError
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 from waiting import PATIENCE, wait_until
 
 
@@ -82,7 +83,8 @@ def test_a_run_that_breaks_down_in_its_numbers_is_a_finding(part, tmp_path, monk
 
 def test_weights_that_are_no_numbers_are_told_before_anybody_acts_on_them(tmp_path):
     (job,) = tiny_jobs("multiply")
-    run = Run.create(tmp_path / "run", job.machine, job.recipe, seed=0, command="test")
+    config = RunConfig(machine=job.machine, recipe=job.recipe, seed=0, command="test")
+    run = Run.create(tmp_path / "run", config)
     with torch.no_grad():
         run.learner.ppo.actor.mlp[0].weight[3, 1] = torch.nan
     with pytest.raises(DivergedError, match="training diverged: an action is not a number"):

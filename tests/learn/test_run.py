@@ -52,7 +52,7 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
 def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
     run, _ = whole
     world = run.learner.env.world
-    drawn = draw_grounds(TINY.stages[1], 2, run.seed)[: TINY.robots]
+    drawn = draw_grounds(TINY.stages[1], 2, run.config.seed)[: TINY.robots]
     for ground, expected in zip(world.terrains, drawn, strict=True):
         np.testing.assert_array_equal(ground.height, expected.height)
     assert run.learner.env.config.push.force == 100.0
@@ -73,7 +73,7 @@ def test_the_config_is_read_back_into_the_same_run(whole):
     again = Run.resume(run.folder)
     assert again.recipe == TINY
     assert again.machine == TROT
-    assert (again.seed, again.command) == (7, "gaitshift train trot")
+    assert (again.config.seed, again.config.command) == (7, "gaitshift train trot")
     config = json.loads((run.folder / "config.json").read_text())
     assert {"python", "numpy", "torch", "mujoco-core"} <= set(config["versions"])
 

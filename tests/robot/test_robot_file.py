@@ -15,6 +15,7 @@ from gaitshift.gait import gaits
 from gaitshift.lab.log import Log
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 from gaitshift.robot.legs import LEGS
 from gaitshift.robot.robot_file import from_dict, read_robot, to_dict
 from gaitshift.show.geometry import Shape
@@ -87,9 +88,10 @@ def test_it_trains_is_told_apart_and_goes_on(tmp_path, capsys):
     recipe = replace(
         Recipe(), robots=4, steps=8, checkpoint_every=2, ppo=PpoConfig(epochs=1, mini_batches=1)
     ).with_iterations(4)
-    run = Run.create(
-        tmp_path / "run", gaits.load("trot"), recipe, seed=1, command="test", robot=robot
+    config = RunConfig(
+        machine=gaits.load("trot"), recipe=recipe, seed=1, command="test", robot=robot
     )
+    run = Run.create(tmp_path / "run", config)
     path = run.train(lambda row: None)
     with pytest.raises(
         GaitshiftError,

@@ -13,6 +13,7 @@ from gaitshift.cli import main
 from gaitshift.gait import gaits
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 
 ITERATIONS = 4
 
@@ -24,7 +25,9 @@ def run(tmp_path_factory):
         Recipe(), robots=4, steps=8, checkpoint_every=2, ppo=PpoConfig(epochs=1, mini_batches=1)
     ).with_iterations(ITERATIONS)
     folder = tmp_path_factory.mktemp("training") / "run"
-    training = Run.create(folder, gaits.load("trot"), recipe, seed=3, command="train <trot>")
+    machine = gaits.load("trot")
+    config = RunConfig(machine=machine, recipe=recipe, seed=3, command="train <trot>")
+    training = Run.create(folder, config)
     training.train(judge=lambda path: {"gait": "none", "speed_mean": 0.25})
     return folder
 

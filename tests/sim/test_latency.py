@@ -147,7 +147,7 @@ def test_targets_that_all_arrive_at_once_give_the_bits_of_a_perfect_link():
 
 
 def test_a_robot_stands_with_late_targets():
-    """Delay alone moves nobody who is told to stand."""
+    """With the stance as its target it stays up and in its stance, however late the target is."""
     world = fly(2, sensors=SensorConfig(delay=(0.0, 0.03), jitter=0.005, loss=0.05))
     for _ in range(round(3.0 / PERIOD)):
         world.step(np.tile(STANCE, (2, 1)))

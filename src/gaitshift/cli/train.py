@@ -100,6 +100,7 @@ class Train(RobotOption):
         try:
             from gaitshift.learn.presets import PRESETS
             from gaitshift.learn.run import Run
+            from gaitshift.learn.run_config import RunConfig
             from gaitshift.learn.settings import differences, with_settings
         except ImportError as error:
             raise GaitshiftError(
@@ -133,11 +134,13 @@ class Train(RobotOption):
         folder = self.out or Path("runs") / f"{machine.name}-{seed}"
         return folder, partial(
             Run.create,
-            machine=machine,
-            recipe=recipe,
-            seed=seed,
-            command=shlex.join(["gaitshift", *sys.argv[1:]]),
-            robot=robot,
+            config=RunConfig(
+                machine=machine,
+                recipe=recipe,
+                seed=seed,
+                command=shlex.join(["gaitshift", *sys.argv[1:]]),
+                robot=robot,
+            ),
             overwrite=self.overwrite,
         )
 

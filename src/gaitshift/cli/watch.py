@@ -24,7 +24,7 @@ LEAST = 19
 
 
 class Watch:
-    """A page during the block, which shows a training once it is told of it."""
+    """Serves the live page while its `with` block runs; `show` names the training to show."""
 
     def __init__(self, port: int) -> None:
         self._port = port

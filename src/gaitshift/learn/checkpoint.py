@@ -1,5 +1,7 @@
 """The checkpoints of a run: files from which it goes on, one for each of some iterations."""
 
+from collections.abc import Iterable
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -48,3 +50,17 @@ def read(path: Path) -> dict[str, Any]:
         raise GaitshiftError(
             f"{path} is damaged; remove it to resume from the checkpoint before it"
         ) from error
+
+
+def averaged(layers: torch.nn.Sequential, paths: Iterable[Path]) -> torch.nn.Sequential:
+    """A copy of an actor's layers, their weights averaged with those of these checkpoints."""
+    mean = deepcopy(layers)
+    total = {name: weights.clone() for name, weights in mean.state_dict().items()}
+    count = 1
+    for path in paths:
+        state = read(path)["ppo"]["actor_state_dict"]
+        for name, weights in total.items():
+            weights += state[f"mlp.{name}"]
+        count += 1
+    mean.load_state_dict({name: weights / count for name, weights in total.items()})
+    return mean

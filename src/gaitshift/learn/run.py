@@ -1,29 +1,22 @@
 """A training run: its folder, its loop, and how it resumes after a kill."""
 
-import json
-import platform
 import time
 from collections.abc import Callable
-from copy import deepcopy
-from dataclasses import asdict
-from importlib.metadata import version
 from math import inf
 from pathlib import Path
 from typing import Any
 
-import cattrs
 import numpy as np
 import torch
 
 from gaitshift import table
 from gaitshift.errors import GaitshiftError
-from gaitshift.gait import RewardMachine
 from gaitshift.learn import checkpoint
 from gaitshift.learn.export import describe, export
 from gaitshift.learn.ground import FIELD, draw_grounds
 from gaitshift.learn.learner import Learner
 from gaitshift.learn.progress import last, trim
-from gaitshift.learn.recipe import Recipe
+from gaitshift.learn.run_config import RunConfig, versions
 from gaitshift.learn.run_folder import (
     CHECKPOINTS,
     CONFIG,
@@ -33,18 +26,13 @@ from gaitshift.learn.run_folder import (
     VERDICTS,
     clear,
     is_barely_begun,
-    read_config,
 )
 from gaitshift.learn.tensorboard_log import TensorBoardLog
-from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.robot_file import from_dict, to_dict
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
 from gaitshift.sim.world import Divergence
 from gaitshift.table import Row
-from gaitshift.whole_file import flush_to_disk, write_text
-
-_STRICT = cattrs.Converter(forbid_extra_keys=True)
+from gaitshift.whole_file import flush_to_disk
 
 Judge = Callable[[Path], Row]
 """Evaluates a policy file and returns its verdict, a row of `verdicts.csv`."""
@@ -64,54 +52,27 @@ class Run:
     weights as an uninterrupted one, bit for bit.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        machine: RewardMachine,
-        recipe: Recipe,
-        seed: int,
-        command: str,
-        robot: Robot = ANYMAL_B,
-    ) -> None:
+    def __init__(self, folder: Path, config: RunConfig) -> None:
         self.folder = folder
-        self.machine = machine
-        self.robot = robot
-        self.recipe = recipe
-        self.seed = seed
-        self.command = command
+        self.config = config
+        self.machine, self.robot, self.recipe = config.machine, config.robot, config.recipe
         self.iteration = 0
         self._wall = 0.0
-        torch.set_num_threads(recipe.threads)
-        torch.manual_seed(seed)
+        torch.set_num_threads(self.recipe.threads)
+        torch.manual_seed(config.seed)
         env = GaitEnv(
-            machine,
+            self.machine,
             flat(FIELD, FIELD),
-            recipe.robots,
-            config=recipe.env,
-            robot=robot,
-            threads=recipe.physics_threads,
+            self.recipe.robots,
+            config=self.recipe.env,
+            robot=self.robot,
+            threads=self.recipe.physics_threads,
         )
-        self.learner = Learner(env, recipe)
+        self.learner = Learner(env, self.recipe)
 
     @classmethod
-    def create(
-        cls,
-        folder: Path,
-        machine: RewardMachine,
-        recipe: Recipe,
-        *,
-        seed: int,
-        command: str,
-        robot: Robot = ANYMAL_B,
-        overwrite: bool = False,
-    ) -> "Run":
+    def create(cls, folder: Path, config: RunConfig, *, overwrite: bool = False) -> "Run":
         """A new run in a new folder, or in the folder of a run that has no checkpoint yet."""
-        samples = recipe.robots * recipe.steps
-        if recipe.ppo.mini_batches > samples:
-            raise GaitshiftError(
-                f"mini_batches must be 1 to robots × steps, {samples}, got "
-                f"{recipe.ppo.mini_batches}"
-            )
         if folder.exists() and not (folder.is_dir() and is_barely_begun(folder)):
             if not overwrite:
                 raise GaitshiftError(
@@ -120,35 +81,19 @@ class Run:
                 )
             clear(folder)
         folder.mkdir(parents=True, exist_ok=True)  # first: without a folder nothing else can work
-        run = cls(folder, machine, recipe, seed, command, robot)
-        config = {
-            "command": command,
-            "seed": seed,
-            "machine": machine.to_dict(),
-            "recipe": asdict(recipe),
-            "versions": _versions(),
-        }
-        if robot != ANYMAL_B:
-            config["robot"] = to_dict(robot)
-        # First, so that a folder that a kill left unfinished still shows what it is.
-        write_text(folder / CONFIG, json.dumps(config, indent=2) + "\n")
+        run = cls(folder, config)
+        config.write(folder)  # first, so that a folder that a kill left still shows what it is
         run._save_checkpoint()
         return run
 
     @classmethod
     def resume(cls, folder: Path) -> "Run":
         """The run of a folder, as it was at its last checkpoint."""
-        config = read_config(folder)
+        config = RunConfig.read(folder)
         try:
-            machine = RewardMachine.from_dict(config["machine"])
-            recipe = _STRICT.structure(config["recipe"], Recipe)
-            robot = from_dict(config["robot"]) if "robot" in config else ANYMAL_B
-            run = cls(folder, machine, recipe, config["seed"], config["command"], robot)
+            run = cls(folder, config)
         except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
             raise GaitshiftError(f"{folder / CONFIG} is damaged: {error}") from error
-        except cattrs.BaseValidationError as error:
-            faults = "; ".join(cattrs.transform_error(error))
-            raise GaitshiftError(f"{folder / CONFIG} is damaged: {faults}") from error
         except GaitshiftError as error:
             raise GaitshiftError(f"{folder / CONFIG}: {error}") from error
         checkpoints = checkpoint.files(folder)
@@ -221,30 +166,24 @@ class Run:
     def export(self, path: Path | None = None) -> None:
         """Writes the present policy, into the run's folder if no path is given."""
         training = {
-            "command": self.command,
-            "seed": self.seed,
+            "command": self.config.command,
+            "seed": self.config.seed,
             "iterations": self.iteration,
             "steps": self._steps(),
-            "versions": _versions(),
+            "versions": versions(),
         }
         info = describe(self.learner.env, training)
         ppo = self.learner.ppo
         export(ppo.actor, info, path or self.folder / POLICY, self._averaged(), ppo.critic)
 
     def _averaged(self) -> torch.nn.Sequential:
-        """The present actor's layers, their weights averaged with those of the last checkpoints."""
-        layers = deepcopy(self.learner.ppo.actor.mlp)
-        total = {name: weights.clone() for name, weights in layers.state_dict().items()}
-        count = 1
-        for path in checkpoint.files(self.folder):
-            earlier = int(path.stem)
-            if earlier < self.iteration and self.recipe.is_averaged(earlier):
-                state = checkpoint.read(path)["ppo"]["actor_state_dict"]
-                for name, weights in total.items():
-                    weights += state[f"mlp.{name}"]
-                count += 1
-        layers.load_state_dict({name: weights / count for name, weights in total.items()})
-        return layers
+        """The present actor's layers, averaged with those of the last checkpoints."""
+        averaged = (
+            path
+            for path in checkpoint.files(self.folder)
+            if int(path.stem) < self.iteration and self.recipe.is_averaged(int(path.stem))
+        )
+        return checkpoint.averaged(self.learner.ppo.actor.mlp, averaged)
 
     def iterate(self) -> Row:
         """One iteration, on the ground of its stage; returns the row that `train` writes."""
@@ -252,7 +191,7 @@ class Run:
         stage, within = self.recipe.stage_at(self.iteration)
         env = self.learner.env
         if within % stage.redraw_every == 0 and (stage.is_rough or within == 0):
-            env.set_terrain(draw_grounds(stage, within, self.seed), stage.fidelity)
+            env.set_terrain(draw_grounds(stage, within, self.config.seed), stage.fidelity)
             env.push_at_most(stage.push)
         env.curriculum = self.recipe.curriculum(self.iteration)
         settling = self.recipe.settling(self.iteration)
@@ -263,7 +202,7 @@ class Run:
             trace=stage.trace_factor,
         )
         if self._is_checkpoint():
-            self.learner.start_episodes(_seed_at(self.seed, self.iteration))
+            self.learner.start_episodes(_seed_at(self.config.seed, self.iteration))
         seen = self.learner.iterate()
         self.iteration += 1
         self._wall += time.perf_counter() - start
@@ -306,7 +245,7 @@ class Run:
         torch.set_rng_state(state["torch_rng"])
         stage, within = self.recipe.stage_at(self.iteration)
         drawn = within - within % stage.redraw_every
-        self.learner.env.set_terrain(draw_grounds(stage, drawn, self.seed), stage.fidelity)
+        self.learner.env.set_terrain(draw_grounds(stage, drawn, self.config.seed), stage.fidelity)
         self.learner.env.push_at_most(stage.push)
 
     def _keep_divergences(self, keep: Keep | None) -> None:
@@ -331,8 +270,3 @@ class Run:
 
 def _seed_at(seed: int, iteration: int) -> int:
     return int(np.random.SeedSequence((seed, iteration)).generate_state(1)[0])
-
-
-def _versions() -> dict[str, str]:
-    packages = ("gaitshift", "mujoco-core", "numpy", "torch", "rsl-rl-lib", "gymnasium")
-    return {"python": platform.python_version(), **{name: version(name) for name in packages}}

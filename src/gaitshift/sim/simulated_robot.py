@@ -5,12 +5,12 @@ from jaxtyping import Float
 
 from gaitshift.control.deployment.datagram import (
     Command,
-    Malformed,
     Sensors,
     decode_command,
     encode_sensors,
 )
 from gaitshift.control.deployment.inbox import Inbox
+from gaitshift.control.deployment.layout import Malformed
 from gaitshift.control.deployment.loop import WATCHDOG_RANGE
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from gaitshift.control.deployment.datagram import Malformed
+from gaitshift.control.deployment.layout import Malformed
 
 
 class _Numbered(Protocol):

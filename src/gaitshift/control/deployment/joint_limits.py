@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from gaitshift.control.deployment.datagram import MOST_TARGET
+from gaitshift.control.deployment.layout import MOST_TARGET
 from gaitshift.robot.description import Robot
 
 

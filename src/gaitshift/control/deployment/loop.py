@@ -11,9 +11,10 @@ from jaxtyping import Float
 
 from gaitshift.control.controller import Controller
 from gaitshift.control.deployment import datagram
-from gaitshift.control.deployment.datagram import Malformed, Sensors, decode_sensors
+from gaitshift.control.deployment.datagram import Sensors, decode_sensors
 from gaitshift.control.deployment.inbox import Inbox
 from gaitshift.control.deployment.joint_limits import JointLimits
+from gaitshift.control.deployment.layout import Malformed
 from gaitshift.control.deployment.soft_stop import DURATION, SoftStop
 from gaitshift.control.estimator import Estimation
 from gaitshift.control.switcher import Switcher, uncounted

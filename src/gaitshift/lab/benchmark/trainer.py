@@ -5,6 +5,7 @@ from pathlib import Path
 from gaitshift.gait import RewardMachine
 from gaitshift.learn.recipe import Recipe
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 from gaitshift.learn.run_folder import POLICY
 
 
@@ -15,7 +16,9 @@ class GaitshiftTrainer:
         self, machine: RewardMachine, recipe: Recipe, seed: int, folder: Path, *, iterations: int
     ) -> None:
         """Trains `iterations` at a time; writes the policy to `folder`."""
-        self._run = Run(folder, machine, recipe, seed, "gaitshift bench time-to-gait")
+        command = "gaitshift bench time-to-gait"
+        config = RunConfig(machine=machine, recipe=recipe, seed=seed, command=command)
+        self._run = Run(folder, config)
         self._iterations = iterations
 
     @property

@@ -22,6 +22,7 @@ from gaitshift.folder_lock import only_writer
 from gaitshift.lab.reproduction.plan import Job
 from gaitshift.learn.learner import DivergedError
 from gaitshift.learn.run import Run
+from gaitshift.learn.run_config import RunConfig
 from gaitshift.learn.run_folder import CHECKPOINTS, CONFIG, POLICY, PROGRESS
 from gaitshift.whole_file import write_text
 
@@ -66,14 +67,13 @@ def _started(folder: Path) -> bool:
 
 
 def _create(job: Job, folder: Path) -> Run:
-    return Run.create(
-        folder,
-        job.machine,
-        job.recipe,
+    config = RunConfig(
+        machine=job.machine,
+        recipe=job.recipe,
         seed=job.seed,
         command=f"gaitshift reproduce --only {job.setting.name}",
-        overwrite=(folder / CONFIG).is_file(),
     )
+    return Run.create(folder, config, overwrite=(folder / CONFIG).is_file())
 
 
 def _trained_to_the_end(job: Job, folder: Path) -> bool:
