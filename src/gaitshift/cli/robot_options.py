@@ -30,7 +30,7 @@ class SensorOption:
 
     sensors: Annotated[SensorConfig, _preset_option] = PERFECT
     """Sensors of the robot and its link to the joints: perfect; like those of ANYmal; or cheap.
-    With the last two, nothing measures the velocity of the base."""
+    With the last two, the velocity of the base is estimated."""
 
 
 @dataclass(frozen=True, kw_only=True)

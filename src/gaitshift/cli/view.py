@@ -34,7 +34,7 @@ class View(RobotOptions, SensorOption):
     track: str = DemoConfig.track
     """Terrain: pieces with lengths in metres."""
     robots: int = 1
-    """Robots on the track, 1 to 16; charts tell of the first."""
+    """Robots on the track, 1 to 16; charts show the first."""
     condition: str = DEFAULT
     """When to shift from trot to bound and back, by the name of a shipped graph."""
     seed: int = 0

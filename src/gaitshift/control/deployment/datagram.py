@@ -1,4 +1,4 @@
-"""What a robot and its controller tell each other, and its encoding as datagrams (`layout`)."""
+"""The messages of a robot and its controller, and their encoding as datagrams (`layout`)."""
 
 from dataclasses import dataclass
 from typing import Any

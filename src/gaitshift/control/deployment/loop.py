@@ -183,11 +183,11 @@ class Deployment:
             self._heading = self._yaw(sensed)
             self._wanted = self._asked = self._command_of(sensed)
             decision = uncounted(np.zeros(1, dtype=bool))
-            told = self._told(sensed)
+            seen = self._with_command(sensed)
         else:
             controller.see(sensed, self._asked)
-            told = self._told(sensed)
-            decision = self.switcher.step(told, controller)
+            seen = self._with_command(sensed)
+            decision = self.switcher.step(seen, controller)
             self._wanted = self._command_of(sensed)
             self._speed_state, asked = self._speed_loop.step(
                 self._speed_state, self._wanted.forward_speed, speed
@@ -195,9 +195,9 @@ class Deployment:
             self._asked = replace(self._wanted, forward_speed=asked)
         target = controller.act(sensed, self._asked)[0]
         self._steps += 1
-        self._decision = self._decided(told, decision)
+        self._decision = self._decided(seen, decision)
         return ControlStep(
-            sensed=told,
+            sensed=seen,
             sequence=newest.sequence,
             decision=decision,
             gait=int(controller.gait[0]),
@@ -214,7 +214,7 @@ class Deployment:
         self._seen = newest.sequence, sensed
         return sensed
 
-    def _told(self, sensed: Proprioception) -> Proprioception:
+    def _with_command(self, sensed: Proprioception) -> Proprioception:
         """Sensors with the time and the command during the step that ended."""
         return replace(
             sensed,
@@ -238,18 +238,18 @@ class Deployment:
         """The heading [rad]; always the first one where it is not measured."""
         return sensed.yaw if sensed.has_heading else self._heading
 
-    def _decided(self, told: Proprioception, decision: Decision) -> datagram.Decision:
+    def _decided(self, seen: Proprioception, decision: Decision) -> datagram.Decision:
         controller = self.controller
-        shown = controller.repertoire.stance_shown(controller.gait, told.contact)
+        shown = controller.repertoire.stance_shown(controller.gait, seen.contact)
         return datagram.Decision(
             gait=controller.repertoire.gaits[int(controller.gait[0])],
             machine_state=int(controller.machine_state[0]),
             stance_shown=bool(shown[0]),
             k=float(decision.k[0]),
             threshold=float(decision.threshold[0]),
-            forward_speed=float(told.need("forward_speed_command", "a datagram")[0]),
-            yaw_rate=float(told.need("yaw_rate_command", "a datagram")[0]),
-            stride_frequency=float(told.need("stride_frequency_command", "a datagram")[0]),
+            forward_speed=float(seen.need("forward_speed_command", "a datagram")[0]),
+            yaw_rate=float(seen.need("yaw_rate_command", "a datagram")[0]),
+            stride_frequency=float(seen.need("stride_frequency_command", "a datagram")[0]),
         )
 
     def _stopping(self, newest: Sensors, now: float, began: float, stop: SoftStop) -> bytes:

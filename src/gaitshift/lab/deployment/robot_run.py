@@ -17,7 +17,7 @@ class RobotRecorder:
     """Collects the log of a simulated robot from its first command on, in single precision.
 
     The robot knows sensors and truth. Gait, machine, counters and commanded speeds are those that
-    its controller tells with each command; an entry holds those of the newest command, which is
+    its controller sends with each command; an entry holds those of the newest command, which is
     the answer to the entry's sensors where the link has no delay.
     """
 
@@ -33,27 +33,27 @@ class RobotRecorder:
         command = robot.inbox.newest
         if command is None:
             return
-        told, terrain = command.decision, world.terrains[0]
-        if told.gait not in self._gaits:
-            self._gaits.append(told.gait)
+        decided, terrain = command.decision, world.terrains[0]
+        if decided.gait not in self._gaits:
+            self._gaits.append(decided.gait)
         if robot.is_driven and not command.is_stop:
             self._fallen = self._fallen | world.truth.body_contact | world.truth.diverged
         sensed = replace(
             world.sensed,
             time=(len(self._steps) + 1) * CONTROL_PERIOD,
-            forward_speed_command=np.array([told.forward_speed]),
-            yaw_rate_command=np.array([told.yaw_rate]),
-            stride_frequency_command=np.array([told.stride_frequency]),
+            forward_speed_command=np.array([decided.forward_speed]),
+            yaw_rate_command=np.array([decided.yaw_rate]),
+            stride_frequency_command=np.array([decided.stride_frequency]),
         )
         self._steps.append(
             Log(
                 sensed=sensed.as_type(np.float32),
                 truth=world.truth.as_type(np.float32),
-                k=np.array([told.k]),
-                threshold=np.array([told.threshold]),
-                gait=np.array([self._gaits.index(told.gait)]),
-                machine_state=np.array([told.machine_state]),
-                stance_shown=np.array([told.stance_shown]),
+                k=np.array([decided.k]),
+                threshold=np.array([decided.threshold]),
+                gait=np.array([self._gaits.index(decided.gait)]),
+                machine_state=np.array([decided.machine_state]),
+                stance_shown=np.array([decided.stance_shown]),
                 fallen=self._fallen,
                 gaits=(),
                 robot=world.robot.name,

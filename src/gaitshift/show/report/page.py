@@ -43,8 +43,8 @@ def write_page(
     if walks:
         data += "".join(_json(f"run{i}", walk, " data-walk") for i, (_, walk) in enumerate(walks))
     if course is not None:
-        told = "<p>Dotted lines: ends of stages. Wheel: zoom. Double click: reset.</p>"
-        body = f"<h2>Course of the training</h2><div id='course'></div>{told}{body}"
+        note = "<p>Dotted lines: ends of stages. Wheel: zoom. Double click: reset.</p>"
+        body = f"<h2>Course of the training</h2><div id='course'></div>{note}{body}"
         data += _json("progress", course)
     parts = {
         "TITLE": html.escape(f"{title} · gaitshift"),

@@ -63,7 +63,7 @@ class LivePage:
         self._show_ground()
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Walks and draws until told to end, or for ever."""
+        """Walks and draws until `until()` is true, or for ever."""
         clock = Clock()
         while not until():
             self._orders.obey(self._refuse)

@@ -38,7 +38,7 @@ class ReplayPage:
         self._build(server, log)
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
-        """Plays until told to end, or for ever."""
+        """Plays until `until()` is true, or for ever."""
         clock, picture, shown = Clock(), 0, -1
         while not until():
             while not self._orders.empty():
