@@ -51,7 +51,7 @@ class EstimatorConfig:
     """Noise of the estimator as standard deviations, equal on all axes.
 
     One set serves gyros of 0.005 to 0.1 rad/s, accelerometers of 0.05 to 0.3 m/s² and encoders of
-    0.001 to 0.01 rad (`docs/results/estimator.md`).
+    0.001 to 0.01 rad.
     """
 
     acceleration: float = 1.0
