@@ -33,8 +33,16 @@ HOP = RewardMachine.from_dict(
         ],
     }
 )
-RANGED = replace(HOP, dwell_range=(2, 8), speed=0.9, speed_range=(0.4, 1.5))
-"""The same gait for several speeds and stride frequencies."""
+RANGED = replace(
+    HOP,
+    dwell_range=(2, 8),
+    speed=0.9,
+    speed_range=(0.4, 1.5),
+    lateral_speed=0.3,
+    height=-0.02,
+    height_range=(-0.1, 0.05),
+)
+"""The same gait for several commands."""
 UNHURRIED = RewardMachine.from_dict(
     HOP.to_dict()
     | {

@@ -285,7 +285,7 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
     assert row["iteration"] == 2
     names = {path.name for path in out.iterdir()}
     assert {"config.json", "progress.csv", "checkpoints", "policy.onnx", "tensorboard"} <= names
-    assert row["verdict"]["gait"] == "none"
+    assert row["verdict"]["gait"] == "stand"
     assert row["verdict"]["clean"] is False
     assert (out / "verdicts.csv").read_text().splitlines()[-1].startswith("2,none,False,")
     main(["train", "--resume", str(out), "--json"])

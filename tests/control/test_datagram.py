@@ -36,6 +36,8 @@ DECISION = Decision(
     k=2.5,
     threshold=9.0,
     forward_speed=1.2,
+    lateral_speed=0.2,
+    body_height=-0.03,
     yaw_rate=-0.1,
     stride_frequency=2.5,
 )
@@ -129,7 +131,7 @@ def test_the_layout_is_that_of_a_packed_little_endian_structure_in_c():
     assert encode_sensors(sent) == body + struct.pack("<I", zlib.crc32(body))
     body = struct.pack("<4sBBHQQQ", b"GAIT", 1, 2, 2, 7, 123_456_789, 6)
     body += struct.pack("<14d32sB", *COMMAND.target, 80.0, 2.0, b"trot", 1)
-    body += struct.pack("<5d", 2.5, 9.0, 1.2, -0.1, 2.5)
+    body += struct.pack("<7d", 2.5, 9.0, 1.2, -0.1, 2.5, 0.2, -0.03)
     assert encode_command(COMMAND) == body + struct.pack("<I", zlib.crc32(body))
 
 
@@ -156,7 +158,7 @@ def test_every_number_out_of_range_is_found_whatever_its_crc(wrong):
         (encode_command(COMMAND), COMMAND_LAYOUT, decode_command),
     ):
         found = list(places(layout))
-        assert len(found) == (36 + 12 + 4 + 9 if layout == SENSORS_LAYOUT else 12 + 2 + 5)
+        assert len(found) == (36 + 12 + 4 + 9 if layout == SENSORS_LAYOUT else 12 + 2 + 7)
         for name, at, most in found:
             value = wrong * most if np.isfinite(wrong) else wrong
             changed = resealed(data, at, struct.pack("<d", value))

@@ -62,6 +62,8 @@ SIZES = {
     "wait": 1,
     "last_action": 12,
     "touch_height": 4,
+    "lateral_speed_command": 1,
+    "body_height_command": 1,
 }
 """S × U in the paper's order (III-C), then the commands, the last action and the paper's h."""
 
@@ -104,6 +106,8 @@ def two_robots():
         forward_speed=np.array([1.2, 0.4]),
         yaw_rate=np.array([-0.3, 0.2]),
         stride_frequency=np.array([2.5, 1.6]),
+        lateral_speed=np.array([0.25, -0.4]),
+        body_height=np.array([-0.05, 0.02]),
     )
     return state, sensed, command
 
@@ -141,6 +145,8 @@ HAND_TABLE = {
     ],
     # From their means, -0.45 and -0.65 m, in units of 10 cm; the last foot saturates at -4.
     "touch_height": [[-0.5, -0.3, 0.5, 0.3], [1.5, 1.5, 1.5, -4]],
+    "lateral_speed_command": [[0.25], [-0.4]],
+    "body_height_command": [[-0.5], [0.2]],
 }
 
 
@@ -212,8 +218,8 @@ def test_heights_of_the_last_touch_are_those_that_the_shift_condition_keeps():
         (sensed, _), before = world.step(target), state.touch_height
         state, _ = walker.step(state, action, sensed, Command.straight(3))
         height, _ = condition.step(height, sensed)
-        touched, kept = ~np.isnan(height), state.touch_height
-        np.testing.assert_allclose(kept[touched], height[touched], atol=1e-9)
+        touched, kept = ~np.isnan(height.height), state.touch_height
+        np.testing.assert_allclose(kept[touched], height.height[touched], atol=1e-9)
         np.testing.assert_array_equal(kept[~sensed.contact], before[~sensed.contact])
         moved += np.count_nonzero(~sensed.contact & (sensed.foot_height != kept))
     assert moved > 100, "feet swing and are remembered where they stood"
@@ -272,7 +278,7 @@ def test_the_mirrored_observation_is_the_observation_of_the_mirrored_motion(gait
             touch_height=state.touch_height[:, [1, 0, 3, 2]],
         ),
         mirrored(sensed),
-        replace(command, yaw_rate=-command.yaw_rate),
+        replace(command, yaw_rate=-command.yaw_rate, lateral_speed=-command.lateral_speed),
     )
     order, signs = observe.mirror
     np.testing.assert_allclose(
@@ -321,6 +327,7 @@ def both_sides_of_the_mirror(robot, *, steps, robots=4):
         forward_speed=np.full(2 * robots, 1.2),
         yaw_rate=pair(turn, -turn),
         stride_frequency=pair(frequency, frequency),
+        lateral_speed=pair(np.full(robots, 0.2), np.full(robots, -0.2)),
     )
     seen = []
     for _ in range(steps):

@@ -101,7 +101,7 @@ def assert_stances_in_turn_walk_the_states(machine, stances):
 
 
 def test_every_shipped_gait_stands_in_the_table():
-    assert gaits.names() == tuple(sorted(SHIPPED))
+    assert gaits.names() == tuple(sorted([*SHIPPED, "stand"]))
 
 
 @pytest.mark.parametrize("name", sorted(SHIPPED))
@@ -121,6 +121,25 @@ def test_a_shipped_gait_is_what_the_table_says(name):
         assert edge.guard.down | edge.guard.up == set(FEET)
         assert edge.swing_height > 0
         assert edge.bonus == 1.0
+
+
+def test_the_gait_that_stands_has_one_state_and_no_stride():
+    machine = gaits.load("stand")
+    assert machine.stands
+    assert not any(gaits.load(name).stands for name in SHIPPED)
+    assert [state.stance for state in machine.states] == [frozenset(FEET)]
+    assert (machine.cycle, machine.touchdowns, machine.speed_range) == ((), (0,) * 4, (0.0, 0.0))
+    assert machine.mirrored_states() == (0,)
+    assert RewardMachine.from_dict(machine.to_dict()) == machine
+    label = np.array([[False] * 4, [True] * 4, [True, False, True, True]])
+    told = machine.step(np.zeros(3, dtype=int), label, np.array([0, 50, 900]))
+    assert (told.state.tolist(), told.changed.any(), told.bonus.tolist()) == (
+        [0] * 3,
+        False,
+        [0.0] * 3,
+    )
+    assert machine.agreement(told.state, label).tolist() == [0.0, 1.0, 0.75]
+    assert machine.punctuality(told.state, np.array([0, 50, 900])).tolist() == [1.0] * 3
 
 
 def onsets(name):
@@ -157,7 +176,9 @@ def test_ideal_phases_and_touchdowns_are_those_of_the_cycle_walked_step_by_step(
 def test_what_may_be_commanded_of_a_gait_lies_about_its_own(name):
     machine = gaits.load(name)
     slow, fast = machine.speed_range
-    assert 0 < slow < machine.speed < fast
+    assert 0 <= slow < machine.speed < fast
+    low, high = machine.height_range
+    assert low <= machine.height <= high
     assert machine.dwell_range[0] <= machine.dwell <= machine.dwell_range[1]
     # Every dwell in range is reached by the stride it makes, or by one that makes the same.
     for dwell in range(machine.dwell_range[0], machine.dwell_range[1] + 1):
@@ -207,7 +228,7 @@ def test_a_file_with_windows_line_ends_and_a_byte_order_mark_loads(tmp_path):
         (
             "trott",
             r"unknown gait 'trott'; did you mean 'trot'\? known gaits: bound, gallop, half_bound,"
-            " pace, pronk, three_one, trot, walk; or give the path of a .toml file",
+            " pace, pronk, stand, three_one, trot, walk; or give the path of a .toml file",
         ),
         ("canter", "unknown gait 'canter'; known gaits: bound, gallop"),
         ("", "unknown gait ''; known gaits: "),

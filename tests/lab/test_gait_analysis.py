@@ -287,7 +287,7 @@ def test_feet_that_land_a_moment_apart_leave_the_order_as_it_is():
 
 
 def test_every_shipped_machine_is_in_the_table():
-    assert set(TABLE) == set(gaits.names())
+    assert {*TABLE, "stand"} == set(gaits.names())
 
 
 def test_a_gallop_is_one_on_either_lead():
@@ -303,9 +303,17 @@ def test_noise_is_no_gait(down, hold, seed):
     assert name(np.repeat(drawn, hold, axis=0)[:1000]) == NONE
 
 
-@pytest.mark.parametrize("down", [True, False])
-def test_standing_and_hanging_are_no_gait(down):
-    assert name(np.full((1000, 4, 4), down)) == NONE
+def test_standing_is_a_gait_of_its_own_and_hanging_is_none():
+    assert name(np.ones((1000, 4, 4), dtype=bool)) == "stand"
+    assert name(np.zeros((1000, 4, 4), dtype=bool)) == NONE
+    lifted = np.ones((1000, 4, 4), dtype=bool)
+    lifted[::5, :, 0] = False  # one foot of each robot shivers
+    assert name(lifted) == NONE
+    lifted[:900] = True
+    assert name(lifted) == "stand", "in one step of fifty"
+    lifted = np.ones((1000, 4, 4), dtype=bool)
+    lifted[300:310, :2] = False  # two robots in four step once
+    assert name(lifted) == NONE
 
 
 @pytest.mark.parametrize("half", [1, 2, 3, 5, 8])

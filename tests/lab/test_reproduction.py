@@ -122,7 +122,10 @@ def test_the_factor_is_on_the_penalties_and_on_nothing_else():
         return env.step(np.random.default_rng(0).normal(size=(5, 12)))[4]["reward_terms"]
 
     whole, quarter = terms(1.0), terms(0.25)
-    gains = {"forward_velocity", "speed_tracking", "stance_feet", "stance_pattern"}
+    gains = {
+        *("forward_velocity", "speed_tracking", "lateral_tracking"),
+        *("stance_feet", "stance_pattern"),
+    }
     for name, values in whole.items():
         np.testing.assert_array_equal(quarter[name], (1.0 if name in gains else 0.25) * values)
     assert all((whole[name] <= 0).all() for name in whole.keys() - gains)

@@ -70,7 +70,7 @@ def test_trials_give_a_row_for_every_ground_and_every_limit(tried):
     lateral = [row for row in rows if row.trial.startswith("lateral")]
     assert all(row.value is None and row.passed is False for row in lateral), "nobody walks"
     assert log.sensed.contact.shape == (30, 3, 4)
-    assert figures["verdict"]["gait"] == "none"
+    assert figures["verdict"]["gait"] == "stand"
     assert done[-1][0] == done[-1][1]
     assert [now for now, _ in done] == sorted(now for now, _ in done)
 
@@ -156,7 +156,7 @@ def test_evaluate_prints_one_object_and_draws(walk_file, tmp_path, capsys):
     main(["evaluate", str(walk_file), *options])
     said = json.loads(capsys.readouterr().out)
     assert said["gait"] == "walk"
-    assert said["verdict"]["gait"] == "none"
+    assert said["verdict"]["gait"] == "stand"
     assert set(said["verdict"]["scores"]) == set(gaits.names())
     assert picture.stat().st_size > 10_000
 

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import orientation_of
 from gaitshift.shift import HeightDifference
-from sensing import DOWN, FEET, standing
+from sensing import DOWN, FEET, ONE_UP, standing
 from turning import rotation
 
 quick = settings(max_examples=60, deadline=None)
@@ -33,7 +33,7 @@ def heights_of(frame, feet_b, gravity_b):
     """H (4,) of a robot that stands on all feet."""
     statistic = HeightDifference(frame=frame)
     sensed = standing(foot_position_b=feet_b, orientation=orientation_of(gravity_b))
-    return statistic.step(statistic.start(1), sensed)[0][0]
+    return statistic.step(statistic.start(1), sensed)[0].height[0]
 
 
 def test_height_is_that_of_the_last_touch_and_is_kept_in_swing():
@@ -44,7 +44,7 @@ def test_height_is_that_of_the_last_touch_and_is_kept_in_swing():
         contact = np.array([touches], dtype=bool)
         sensed = standing(contact=contact, foot_position_b=feet_at(heights[None]))
         state, values = statistic.step(state, sensed)
-    np.testing.assert_array_equal(state, [[0.1, 0.6, np.nan, 0.8]])
+    np.testing.assert_array_equal(state.height, [[0.1, 0.6, np.nan, 0.8]])
     pairs = sorted(values[0][~np.isnan(values[0])].tolist())
     assert pairs == pytest.approx([0.2, 0.5, 0.7]), "of the three feet that have touched"
 
@@ -65,7 +65,7 @@ def test_gravity_frame_sees_the_world_heights_however_the_body_is_turned(steps, 
         state, values = statistic.step(state, turned)
         level = standing(contact=touches[None], foot_position_b=feet_at(heights[None]))
         plain, same = upright.step(plain, level)
-        np.testing.assert_allclose(state, plain, atol=1e-9)
+        np.testing.assert_allclose(state.height, plain.height, atol=1e-9)
         np.testing.assert_allclose(values, same, atol=1e-9)
 
 
@@ -105,3 +105,19 @@ def test_unknown_frame_is_refused_with_the_known_ones():
     with pytest.raises(GaitshiftError) as caught:
         statistic.__post_init__()
     assert str(caught.value) == "frame must be body or gravity, got 'world'"
+
+
+def test_a_false_touch_in_mid_swing_is_no_touch():
+    """A swinging foot 10 cm up is felt for 30 ms: h follows it at once, or not at all."""
+    counts, filtered = HeightDifference(), HeightDifference(least_stance=0.04)
+    states = [counts.start(1), filtered.start(1)]
+    felt = [[1, 1, 1, 1]] * 5 + [[0, 1, 1, 1]] * 3 + [[1, 1, 1, 1]] * 3 + [[0, 1, 1, 1]]
+    for step, contact in enumerate(felt):
+        feet = FEET if step < 5 else ONE_UP
+        sensed = standing(feet=feet, contact=np.array([contact], dtype=bool))
+        states = [
+            statistic.step(state, sensed)[0]
+            for statistic, state in zip((counts, filtered), states, strict=True)
+        ]
+    assert states[0].height[0] == pytest.approx([-0.4, -0.5, -0.5, -0.5])
+    assert states[1].height[0] == pytest.approx([-0.5] * 4)

@@ -19,6 +19,33 @@ def test_odometry_by_the_standing_feet_is_where_the_base_went():
         np.testing.assert_allclose(state.base[0] + first, base, atol=0.03)
 
 
+def test_a_foot_that_is_felt_in_its_swing_does_not_carry_the_base():
+    """The other feet show 1 m/s; the swinging one is felt for 30 ms every 0.2 s."""
+    for false in (False, True):
+        odometry = LegOdometry()
+        state, first = odometry.start(1), None
+        for step, (base, sensed) in enumerate(strolling(lambda x, y: 0.0, turn=0.0, wobble=0.0)):
+            felt = sensed.contact | (np.arange(4) == (step // 20) % 4) * (
+                false and step > 20 and step % 20 < 3
+            )
+            state, _ = odometry.step(state, replace(sensed, contact=felt))
+            first = base - state.base[0] if first is None else first
+        assert np.linalg.norm(state.base[0] + first - base) < 0.03, false
+
+
+def test_odometry_finds_back_to_feet_that_stand():
+    """A robot that is carried away at 3 m/s, with one foot down, is followed after 0.3 s."""
+    odometry, one = LegOdometry(), np.array([[True, False, False, False]])
+    state = odometry.start(1)
+    for _ in range(20):
+        state, _ = odometry.step(state, standing())
+    for step in range(60):
+        feet = (FEET - step * PERIOD * np.array([3.0, 0.0, 0.0]))[None]
+        before = state
+        state, _ = odometry.step(state, replace(standing(), contact=one, foot_position_b=feet))
+    np.testing.assert_allclose(state.base - before.base, [[3.0 * PERIOD, 0.0, 0.0]], atol=1e-9)
+
+
 def test_a_flight_is_a_parabola():
     """Thrown up at 1 m/s a base is back where it was after 2 / 9.81 s, as far on as its speed."""
     odometry = LegOdometry(smoothing=PERIOD)

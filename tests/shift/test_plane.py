@@ -77,7 +77,13 @@ def test_a_slope_is_not_roughness_and_waves_are(statistic):
 def test_a_foot_that_bounces_has_touched_once():
     statistic = PlaneResidual(touches=2)
     state = statistic.start(1)
-    for contact in ([1, 1, 1, 1], [0, 1, 1, 1], [1, 1, 1, 1], *[[0, 1, 1, 1]] * 6, [1, 1, 1, 1]):
+    for contact in (
+        *[[1, 1, 1, 1]] * 3,
+        [0, 1, 1, 1],
+        [1, 1, 1, 1],
+        *[[0, 1, 1, 1]] * 6,
+        *[[1, 1, 1, 1]] * 3,
+    ):
         sensed = replace(standing(), contact=np.array([contact], dtype=bool))
         state, _ = statistic.step(state, sensed)
         counts = (~np.isnan(state.touch[0, :, :, 0])).sum(axis=1).tolist()

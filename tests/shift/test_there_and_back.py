@@ -185,7 +185,7 @@ def test_firing_restarts_count_and_heights_or_neither(reset):
     for heights in [uneven] * 3 + [level] * 3 + [uneven] * 2:
         edge = state.gait.item()
         state, decision = graph.step(state, standing(foot_position_b=feet_at(heights[None])))
-        height = state.memory["ground"][0, 3].item()
+        height = state.memory["ground"].height[0, 3].item()
         height = None if math.isnan(height) else height
         history.append((state.k[0, edge].item(), decision.fired.item(), height))
     anew = [
@@ -218,7 +218,11 @@ def test_without_reset_k_goes_on_from_where_it_fired():
 
 def test_alpha_can_change_between_steps_and_the_count_goes_on():
     z, contact = np.array([[0.0, 0.1, 0.3, 0.6]]), np.ones((1, 4), dtype=bool)
-    state = replace(PAPER.begin(1), memory={"ground": z}, k=np.array([[7.0, 0.0]]))
+    state = replace(
+        PAPER.begin(1),
+        memory={"ground": replace(PAPER.begin(1).memory["ground"], height=z)},
+        k=np.array([[7.0, 0.0]]),
+    )
     for alpha, more in ((0.25, 4), (0.55, 1)):
         ((_, k, _),) = walk(tuned(PAPER, alpha=alpha), z, contact, state=state)
         assert k == 7 + more

@@ -165,6 +165,13 @@ def enter(page, label, number):
     box.press("Enter")
 
 
+def enter_alone(page, label, number):
+    """Types a number into the box of this label, which has no slider."""
+    box = box_of(page, label)
+    box.fill(str(number))
+    box.press("Enter")
+
+
 def box_of(page, label):
     """The box that this label stands before."""
     return page.locator("label").get_by_text(label, exact=True).locator("xpath=following::input[1]")
@@ -213,14 +220,14 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
     """No feet differ by 0.3 m on this ground, and nearly all steps differ by 5 mm."""
     _, address = served("--track", "perlin:0.1@60")
     page, wrong = opened(browser, address, fine=True)
-    enter(page, "α [m]", 0.3)
-    enter(page, "α' [m]", 0.3)
+    enter_alone(page, "α [mm]", 300)
+    enter_alone(page, "α' [mm]", 300)
     wait_until(gait_is(page, "trot"))
     walked = status(page)[1]
     wait_until(lambda: abs(status(page)[1] - walked) > 3.0)  # at the track's end it begins anew
     assert status(page)[0] == "trot"
-    enter(page, "α' [m]", 0.001)
-    enter(page, "α [m]", 0.005)
+    enter_alone(page, "α' [mm]", 1)
+    enter_alone(page, "α [mm]", 5)
     wait_until(gait_is(page, "bound"))
     browsing.wait_for_robot(page, "view", columns=BESIDE_THE_PANEL)
     page.get_by_role("button", name="push", exact=True).click()
@@ -265,7 +272,7 @@ def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_
     page.get_by_label("shifts by itself").uncheck()
     page.get_by_role("button", name="trot", exact=True).click()
     wait_until(gait_is(page, "trot"))
-    enter(page, "α [m]", 0.005)  # with which it would shift at once
+    enter_alone(page, "α [mm]", 5)  # with which it would shift at once
     page.get_by_label("the gait's own speed and stride").uncheck()
     enter(page, "speed [m/s]", 0.8)
     enter(page, "stride [Hz]", 2.0)

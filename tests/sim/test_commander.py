@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gaitshift.gait import gaits
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from hopping import FLAT, HOP, arbitrary_actions, commanded, feed, ranged
 
@@ -22,6 +23,36 @@ def test_commands_are_drawn_from_the_gaits_ranges_and_reach_their_ends():
     np.testing.assert_allclose(np.unique(np.rint(stride)), np.arange(4, 17, 2))
     np.testing.assert_allclose(stride, np.rint(stride), atol=1e-4)
     assert abs(np.corrcoef(speed, stride)[0, 1]) < 0.2, "each is drawn by itself"
+
+
+def aside(env, resets=30):
+    """Lateral speeds [m/s] and body heights [m] of the first commands of many episodes."""
+    places = env.walker.observation.slices
+    side, height = (places[f"{name}_command"] for name in ("lateral_speed", "body_height"))
+    seen = [env.reset(seed=seed)[0] for seed in range(resets)]
+    return tuple(np.concatenate([one[:, place] for one in seen])[:, 0] for place in (side, height))
+
+
+def test_a_lateral_speed_and_a_height_are_drawn_from_their_ranges_or_nominal():
+    side, height = aside(ranged(10, command_share=1.0))
+    assert (side.min(), side.max()) == pytest.approx((-0.3, 0.3), abs=0.02)
+    assert (height.min() / 10, height.max() / 10) == pytest.approx((-0.1, 0.05), abs=0.005)
+    side, height = aside(ranged(10, command_share=0.3))
+    for asked, home in ((side, 0.0), (height, -0.2)):  # heights are observed in units of 10 cm
+        assert np.mean(np.isclose(asked, home)) == pytest.approx(0.7, abs=0.1)
+    env = ranged(10, command_share=1.0)
+    env.curriculum = Curriculum(command_scale=0.5)
+    side, height = aside(env)
+    assert np.abs(side).max() == pytest.approx(0.15, abs=0.01)
+    assert (height.min() / 10, height.max() / 10) == pytest.approx((-0.06, 0.015), abs=0.004)
+
+
+def test_a_gait_that_stands_is_not_asked_to_turn():
+    env = GaitEnv(gaits.load("stand"), FLAT, 4, config=EnvConfig(command_interval=5), threads=1)
+    env.reset(seed=0)
+    turn = env.walker.observation.slices["yaw_rate_command"]
+    for action in arbitrary_actions(0, 20, 4, size=0.2):
+        assert not env.step(action)[0][:, turn].any()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.6])
@@ -103,6 +134,9 @@ def test_an_environment_tells_what_may_be_commanded():
         "speed_range": [0.4, 1.5],
         "stride_frequency": pytest.approx(100 / 6),
         "stride_frequency_range": [pytest.approx(6.25), pytest.approx(25.0)],
+        "lateral_speed": 0.3,
+        "body_height": -0.02,
+        "height_range": [-0.1, 0.05],
     }
     told = ranged(1, command_share=0.0, forward_speed=1.1).commands()
     assert told == {
@@ -110,4 +144,7 @@ def test_an_environment_tells_what_may_be_commanded():
         "speed_range": [1.1, 1.1],
         "stride_frequency": pytest.approx(100 / 6),
         "stride_frequency_range": [pytest.approx(100 / 6)] * 2,
+        "lateral_speed": 0.0,
+        "body_height": -0.02,
+        "height_range": [-0.02, -0.02],
     }

@@ -99,7 +99,9 @@ def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(mo
             assert info["shows_stance"][robot] == (contact == stance)
             agreeing = sum(foot == due for foot, due in zip(contact, stance, strict=True))
             weight = env.config.reward.stance_feet
-            assert info["reward_terms"]["stance_feet"][robot] == weight * agreeing / 4
+            late = max(deltas[robot] + 1 - DWELL - 2, 0) / (0.5 * DWELL)
+            due = weight * max(1.0 - late, 0.0) * agreeing / 4
+            assert info["reward_terms"]["stance_feet"][robot] == pytest.approx(due)
             terms = sum(float(term[robot]) for term in info["reward_terms"].values())
             bonus = env.config.reward.bonus * factor * share * on_time if taken else 0.0
             assert reward[robot] == pytest.approx(terms + bonus, abs=1e-9)

@@ -32,6 +32,8 @@ TABLE_I = {
 CONFIG = replace(
     RewardConfig.paper(),
     speed_tracking=2.0,
+    lateral_tracking=4.0,
+    body_height=-100.0,
     stance_feet=5.0,
     stance_pattern=3.0,
     slip=-0.5,
@@ -113,8 +115,12 @@ def three_robots():
             forward_speed=np.array([1.2, 0.2, 1.2]),
             yaw_rate=np.array([0.1, -0.2, 0.0]),
             stride_frequency=np.array([1.5, 2.5, 3.5]),
+            lateral_speed=np.array([0.2, 0.0, 0.4]),
         ),
         "stance": STANCE,
+        "steps_aside": True,
+        "height_error": np.array([0.1, -0.2, 0.0]),
+        "in_time": np.array([1.0, 0.5, 0.25]),
         "agreement": np.array([1.0, 0.75, 0.5]),
         "chatter": np.array([2.0, 0.0, 0.75]),
         "action_change": np.stack([0.1 * RAMP, np.zeros(12), -np.ones(12)]),
@@ -125,8 +131,8 @@ HAND_TABLE = {
     # Body velocities: robot 0 (0.7, 0.3, -0.2); robot 1 (1.2, 0.3, 0.1); robot 2 (1, 0.2, 0.4).
     # 10 exp(-(1.2 - 0.7)²) = 10 exp(-0.25); 10 exp(-(0.2 - 1.2)²) = 10 exp(-1); 10 exp(-0.04)
     "forward_velocity": (7.788007830714049, 3.678794411714423, 9.607894391523232),
-    # -10 (0.09 + 0.04); -10 (0.09 + 0.01); -10 (0.04 + 0.16)
-    "lateral_velocity": (-1.3, -1.0, -2.0),
+    # With 0.2, 0 and 0.4 asked for: -10 (0.01 + 0.04); -10 (0.09 + 0.01); -10 (0.04 + 0.16)
+    "lateral_velocity": (-0.5, -1.0, -2.0),
     # -0.1 (0.25 + 1); -0.1 (0.04 + 0.09); -0.1 (0.09 + 0.01)
     "roll_pitch_rate": (-0.125, -0.013, -0.01),
     # -25 (0.4 - 0.1)²; -25 (0 + 0.2)²; -25 (-0.2)²
@@ -139,8 +145,12 @@ HAND_TABLE = {
     "joint_velocity": (-1.625, -0.04, 0.0),
     # 2 exp(-(0.5 / 0.25)²) = 2 exp(-4); 2 exp(-(1 / 0.25)²) = 2 exp(-16); 2 exp(-0.64)
     "speed_tracking": (0.03663127777746836, 2.2507034943851823e-07, 1.0545848480860982),
-    # 5 times the share of four, three and two feet
-    "stance_feet": (5.0, 3.75, 2.5),
+    # 4 exp(-(0.1 / 0.25)²) = 4 exp(-0.16); 4 exp(-1.44); 4 exp(-0.64)
+    "lateral_tracking": (3.4085751559648453, 0.9477110735281574, 2.1091696961721964),
+    # -100 times 0.1² and 0.2²
+    "body_height": (-1.0, -4.0, 0.0),
+    # 5 times the share of four, three and two feet; half and a quarter of that come late
+    "stance_feet": (5.0, 1.875, 0.625),
     # 3 where all four agree
     "stance_pattern": (3.0, 0.0, 0.0),
     # -0.5 (FL 0.01 + 0.04, BL 0.09 + 0.16); no foot down; -0.5 (FR 0.36 + 0.64, BR 0.04)

@@ -28,6 +28,8 @@ class Repertoire:
     """Their nominal speeds [m/s]."""
     stride_frequency: Float[np.ndarray, " G"]
     """Their nominal cycles a second [Hz]."""
+    body_height: Float[np.ndarray, " G"] | None = None
+    """Their nominal body heights, from that of the stance [m]; None: all 0."""
 
     def index(self, gait: str) -> int:
         """Index of a gait.
@@ -48,11 +50,13 @@ class Repertoire:
             yield index, np.flatnonzero(gait == index)
 
     def own_command(self, gait: Int[np.ndarray, " N"]) -> Command:
-        """Straight ahead, at the nominal speed and stride frequency of each robot's gait."""
+        """Straight ahead, at the nominal speed, frequency and height of each robot's gait."""
+        height = np.zeros(len(self.gaits)) if self.body_height is None else self.body_height
         return Command(
             forward_speed=self.forward_speed[gait],
             yaw_rate=np.zeros(len(gait)),
             stride_frequency=self.stride_frequency[gait],
+            body_height=height[gait],
         )
 
     def stance_shown(

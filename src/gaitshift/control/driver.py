@@ -43,6 +43,7 @@ class Driver:
             machines=tuple(policy.machine for policy in self.policies.values()),
             forward_speed=np.array([info.forward_speed for info in infos]),
             stride_frequency=np.array([info.stride_frequency for info in infos]),
+            body_height=np.array([info.body_height for info in infos]),
         )
         self.n = n
         first = self.repertoire.index(start)
@@ -92,6 +93,7 @@ class Driver:
             policy, whole = self.policies[self.repertoire.gaits[index]], len(ids) == self.n
             before = self.state if whole else self.state.robots(ids)
             felt, asked = (sensed, command) if whole else (sensed.robots(ids), command.of(ids))
+            asked = policy.within(asked)
             after, step = policy.walker.step(before, before.last_action, felt, asked)
             self.state = after if whole else self.state.with_robots(ids, after)
             self._changes_due[ids] -= step.changed
@@ -125,6 +127,7 @@ class Driver:
             policy, whole = self.policies[self.repertoire.gaits[index]], len(ids) == self.n
             state = self.state if whole else self.state.robots(ids)
             felt, asked = (sensed, command) if whole else (sensed.robots(ids), command.of(ids))
+            asked = policy.within(asked)
             observation = policy.walker.observe(state, felt, asked)
             self._acted_on.append((policy, ids, observation))
             last_action[ids], target[ids] = policy.walker.target(policy(observation))

@@ -62,8 +62,9 @@ STEP_SCALE = 0.05
 """δ is observed in units of 20 control steps, at most 5 units: ours, to keep inputs near 1."""
 
 
-TOUCH_SCALE = 10.0
-"""Differences of touch heights are observed in units of 10 cm, at most 4 units: ours."""
+HEIGHT_SCALE = 10.0
+"""Commanded heights and differences of touch heights are observed in units of 10 cm, the latter at
+most 4 units: ours."""
 
 
 def _sensed(s: _Instant, name: str) -> np.ndarray:
@@ -72,7 +73,7 @@ def _sensed(s: _Instant, name: str) -> np.ndarray:
 
 def _touch_differences(s: _Instant) -> np.ndarray:
     difference = s.state.touch_height - s.state.touch_height.mean(axis=1, keepdims=True)
-    return np.clip(TOUCH_SCALE * difference, -4.0, 4.0)
+    return np.clip(HEIGHT_SCALE * difference, -4.0, 4.0)
 
 
 def _machine_slice(machine: RewardMachine) -> _Slice:
@@ -110,6 +111,8 @@ _SLICES: dict[str, _Slice] = {
     "forward_speed_command": _column(lambda s: s.command.forward_speed),
     "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
     "stride_command": _column(lambda s: STEP_SCALE * s.command.stride),
+    "lateral_speed_command": _column(lambda s: s.command.lateral_speed, -1),
+    "body_height_command": _column(lambda s: HEIGHT_SCALE * s.command.body_height),
     "last_action": _Slice(12, lambda s: s.state.last_action, JOINT_MIRROR),
     "touch_height": _Slice(4, _touch_differences, (MIRRORED_LEGS, (1,) * 4)),
 }
@@ -138,6 +141,8 @@ DEFAULT_SLICES = (
     "wait",
     "last_action",
     "touch_height",
+    "lateral_speed_command",
+    "body_height_command",
 )
 
 

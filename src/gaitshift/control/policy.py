@@ -1,6 +1,6 @@
 """A policy file: one ONNX network with all data needed to run it, checked when loaded."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -13,7 +13,7 @@ from gaitshift.control.policy_info import PolicyInfo, read_info
 from gaitshift.control.walker import Walker
 from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine
-from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.command import CONTROL_PERIOD, Command
 from gaitshift.robot.description import ANYMAL_B, Robot
 
 if TYPE_CHECKING:
@@ -56,6 +56,26 @@ class Policy:
             action_scale=self.info.action_scale,
         )
 
+    def within(self, command: Command) -> Command:
+        """The command, less what the policy was not trained for.
+
+        Lateral speeds and body heights are clipped to their ranges: of a gait that never saw any,
+        the command stays at 0. A gait that stands gets no speed and no turn.
+        """
+        side, (low, high) = self.info.lateral_speed, self.info.height_range
+        aside, height = command.lateral_speed, command.body_height
+        asked = command
+        if (np.abs(aside) > side).any() or (height < low).any() or (height > high).any():
+            asked = replace(
+                command,
+                lateral_speed=np.clip(aside, -side, side),
+                body_height=np.clip(height, low, high),
+            )
+        if not self.machine.stands:
+            return asked
+        still = np.zeros(len(command.forward_speed))
+        return replace(asked, forward_speed=still, yaw_rate=still)
+
     def __call__(self, observation: Float32[np.ndarray, "N D"]) -> Float32[np.ndarray, "N 12"]:
         """The deterministic actions for N observations."""
         return self._run("action", observation)
@@ -89,9 +109,13 @@ class Policy:
         return options
 
 
-def shipped() -> tuple[str, ...]:
-    """Names of the gaits whose policies come with the package."""
-    return tuple(sorted(path.stem for path in _SHIPPED.glob("*.onnx")))
+def shipped(folder: str = ".") -> tuple[str, ...]:
+    """Names of the gaits whose policies come with the package.
+
+    The folder "deployable" has policies for a robot with real sensors; `load` takes one as
+    "deployable/trot".
+    """
+    return tuple(sorted(path.stem for path in (_SHIPPED / folder).glob("*.onnx")))
 
 
 def record_file(gait: str) -> Path:

@@ -1,7 +1,7 @@
 """The description of a policy in its file, read with checks."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from reprlib import repr as shortened
@@ -46,11 +46,26 @@ class PolicyInfo:
     """Least and greatest stride frequency that it was trained for [Hz]."""
     training: dict[str, Any]
     """Command, seed, versions and figures of the training that made it."""
+    lateral_speed: float = 0.0
+    """Greatest lateral speed that it was trained for, to either side [m/s]."""
+    body_height: float = 0.0
+    """Nominal height of the body, from that of the stance [m]."""
+    height_range: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    """Least and greatest body height that it was trained for, from that of the stance [m]."""
     format_version: int = FORMAT_VERSION
 
     def to_metadata(self) -> dict[str, str]:
         """As ONNX metadata: every value as JSON text."""
         return {f"gaitshift.{key}": json.dumps(value) for key, value in vars(self).items()}
+
+
+_NAMES = tuple(PolicyInfo.__dataclass_fields__)
+_ADDED: dict[str, object] = {
+    "lateral_speed": 0.0,
+    "body_height": 0.0,
+    "height_range": [0.0, 0.0],
+}
+"""Values of files that were written before there were such commands."""
 
 
 def read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
@@ -68,14 +83,14 @@ def read_info(path: Path, metadata: dict[str, str]) -> PolicyInfo:
             f"{path}: format version must be {FORMAT_VERSION}, got {version}; export the policy "
             "with this version of gaitshift"
         )
-    fields = PolicyInfo.__dataclass_fields__
-    missing = [name for name in fields if f"gaitshift.{name}" not in metadata]
+    names = [name for name in _NAMES if f"gaitshift.{name}" in metadata]
+    missing = [name for name in _NAMES if name not in (*names, *_ADDED)]
     if missing:
         raise GaitshiftError(
             f"{path} lacks the metadata '{missing[0]}'; export it again from its run"
         )
     try:
-        return _info_of({name: _value(name, metadata[f"gaitshift.{name}"]) for name in fields})
+        return _info_of({name: _value(name, metadata[f"gaitshift.{name}"]) for name in names})
     except GaitshiftError as error:
         raise GaitshiftError(f"{path}: metadata {error}; export it again from its run") from error
 
@@ -91,7 +106,7 @@ def _info_of(values: dict[str, object]) -> PolicyInfo:
     Raises:
         GaitshiftError: a value has a wrong type or size; the message names its key.
     """
-    read = Table(values, keys=tuple(PolicyInfo.__dataclass_fields__))
+    read = Table(_ADDED | values, keys=_NAMES)
     info = PolicyInfo(
         robot=read.text("robot"),
         machine=_table(values, "machine"),
@@ -104,11 +119,14 @@ def _info_of(values: dict[str, object]) -> PolicyInfo:
         kp=read.number("kp"),
         kd=read.number("kd"),
         control_rate=_above_0(read, "control_rate"),
-        forward_speed=_above_0(read, "forward_speed"),
+        forward_speed=_from_0(read, "forward_speed"),
         speed_range=_range(read, "speed_range"),
         stride_frequency=_above_0(read, "stride_frequency"),
         stride_frequency_range=_range(read, "stride_frequency_range"),
         training=_table(values, "training"),
+        lateral_speed=read.number("lateral_speed"),
+        body_height=read.number("body_height"),
+        height_range=list(read.numbers("height_range", 2, "two numbers, such as [-0.1, 0.0]")),
         format_version=read.whole("format_version"),
     )
     if info.stride_frequency_range[0] == 0:
@@ -137,6 +155,13 @@ def _above_0(read: Table, key: str) -> float:
     value = read.number(key)
     if not 0 < value < inf:
         raise GaitshiftError(f"{key!r} must be a finite number above 0, got {value:g}")
+    return value
+
+
+def _from_0(read: Table, key: str) -> float:
+    value = read.number(key)
+    if not 0 <= value < inf:
+        raise GaitshiftError(f"{key!r} must be a finite number from 0 up, got {value:g}")
     return value
 
 

@@ -20,7 +20,7 @@ from gaitshift.gait.laws import (
     stride,
     touchdowns,
 )
-from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED
+from gaitshift.robot.command import MOST_HEIGHT, MOST_SPEED, PAPER_SPEED
 from gaitshift.robot.legs import LEGS, MIRRORED_LEGS
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
@@ -32,6 +32,9 @@ _KEYS = (
     "dwell_range",
     "speed",
     "speed_range",
+    "lateral_speed",
+    "height",
+    "height_range",
     "swing_height",
     "ideal_phase",
     "state",
@@ -82,6 +85,16 @@ class Definition:
     speed_range: tuple[float, float]
     """Least and greatest forward speed that may be commanded [m/s]."""
 
+    lateral_speed: float = 0.0
+    """Greatest lateral speed that may be commanded, to either side [m/s]."""
+
+    height: float = 0.0
+    """Nominal height of the body, from that of the robot's stance [m]."""
+
+    height_range: tuple[float, float] = (0.0, 0.0)
+    """Least and greatest body height that may be commanded, from that of the robot's stance [m];
+    both are `height` in a gait whose body height is not commanded."""
+
     def __post_init__(self):
         if not _NAME.fullmatch(self.name):
             raise GaitshiftError(
@@ -93,15 +106,23 @@ class Definition:
                 raise GaitshiftError(
                     f"ideal_phase: {leg} must be at least 0 and below 1, got {phase:g}"
                 )
-        for name, own in (("dwell", self.dwell), ("speed", self.speed)):
-            low, high = getattr(self, f"{name}_range")
-            if not 0 <= low <= own <= high:
+        for name, least in (("dwell", 0), ("speed", 0), ("height", -MOST_HEIGHT)):
+            own, (low, high) = getattr(self, name), getattr(self, f"{name}_range")
+            if not least <= low <= own <= high:
                 raise GaitshiftError(
                     f"{name}_range must be two rising numbers with {name} = {own:g} between them,"
                     f" got {low:g} to {high:g}"
                 )
-        if self.speed == 0:
+        if self.speed == 0 and self.edges:
             raise GaitshiftError(f"speed must be above 0 m/s, got {self.speed:g}")
+        if not 0 <= self.lateral_speed <= MOST_SPEED:
+            raise GaitshiftError(
+                f"lateral_speed must be 0 to {MOST_SPEED:g} m/s, got {self.lateral_speed:g}"
+            )
+        if not self.height_range[1] <= MOST_HEIGHT:
+            raise GaitshiftError(
+                f"height_range must end at {MOST_HEIGHT:g} m or below, got {self.height_range[1]:g}"
+            )
         if not self.speed_range[1] <= MOST_SPEED:
             raise GaitshiftError(
                 f"speed_range must end at {MOST_SPEED:g} m/s or below, got {self.speed_range[1]:g}"
@@ -119,6 +140,16 @@ class Definition:
     def accepting(self) -> tuple[int, ...]:
         """F: the states in which a run ends; empty for a gait without an end."""
         return tuple(u for u, state in enumerate(self.states) if state.accepting)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the robot stands: one state, which it never leaves."""
+        return not self.edges
+
+    @property
+    def has_height(self) -> bool:
+        """Whether a body height may be commanded."""
+        return self.height_range[0] < self.height_range[1]
 
     @property
     def cycle(self) -> tuple[int, ...]:
@@ -165,6 +196,9 @@ class Definition:
             "dwell_range": list(self.dwell_range),
             "speed": self.speed,
             "speed_range": list(self.speed_range),
+            "lateral_speed": self.lateral_speed,
+            "height": self.height,
+            "height_range": list(self.height_range),
             "ideal_phase": dict(zip(LEGS, self.ideal_phase, strict=True)),
             "state": [state.to_dict() for state in self.states],
             "transition": [edge.to_dict() for edge in self.edges],
@@ -182,6 +216,7 @@ class Definition:
         swing_height = table.number("swing_height", default=0.0)
         check_swing_height(swing_height)
         speed = table.number("speed", default=PAPER_SPEED)
+        height = table.number("height", default=0.0)
         dwell_range = table.pair("dwell_range", default=(dwell, dwell))
         if not all(end.is_integer() for end in dwell_range):
             raise GaitshiftError("dwell_range must be two whole numbers of control steps")
@@ -198,12 +233,17 @@ class Definition:
             ),
             edges=tuple(
                 Transition.from_dict(one, number=number, dwell=dwell, swing_height=swing_height)
-                for number, one in enumerate(table.tables("transition"), start=1)
+                for number, one in enumerate(
+                    table.tables("transition") if table.has("transition") else [], start=1
+                )
             ),
             dwell=dwell,
             dwell_range=(int(dwell_range[0]), int(dwell_range[1])),
             speed=speed,
             speed_range=table.pair("speed_range", default=(speed, speed)),
+            lateral_speed=table.number("lateral_speed", default=0.0),
+            height=height,
+            height_range=table.pair("height_range", default=(height, height)),
             ideal_phase=(fl, fr, bl, br),
         )
 

@@ -1,7 +1,8 @@
 """The laws of every machine, checked before it is used.
 
 1. Names of states are unique, and edges join states that exist.
-2. A state has an outgoing edge, or it is accepting and has none.
+2. A state has an outgoing edge, or it is accepting and has none. A machine of one state has no
+   edge: its robot stands.
 3. Every state is reached from the initial one.
 4. Two guards of one source state never hold at once, so δu is a function.
 5. A guard does not hold in the stance of its source, because otherwise a robot would leave the
@@ -71,6 +72,8 @@ def _check_names(states: tuple[State, ...], edges: tuple[Transition, ...]) -> No
 def _check_ways_out(states: tuple[State, ...], edges: tuple[Transition, ...]) -> None:
     if states[0].accepting:
         raise GaitshiftError(f"state {states[0].name}: the first state must not be accepting")
+    if len(states) == 1 and not edges:
+        return  # a robot that stands
     left = {edge.source: _title(number, edge) for number, edge in enumerate(edges, start=1)}
     for state in states:
         if state.accepting and state.name in left:
@@ -164,7 +167,12 @@ def touchdowns(
 def shares(
     states: tuple[State, ...], edges: tuple[Transition, ...], dwell: int
 ) -> tuple[float, ...]:
-    """Dwell of each edge of the cycle over the machine's own dwell, 1 where that is 0."""
+    """Dwell of each edge of the cycle over the machine's own dwell, 1 where that is 0.
+
+    A machine without edges has a cycle of one dwell.
+    """
+    if not edges:
+        return (1.0,)
     return tuple(
         edges[number].guard.dwell / dwell if dwell else 1.0 for number in cycle(states, edges)
     )

@@ -47,7 +47,7 @@ def deployable() -> Recipe:
         softness=(1.0, 3.0),
     )
     link = replace(ANYMAL, name="deployable", delay=(0.0, 0.03))
-    return Recipe(env=EnvConfig(sensors=link, randomisation=bodies))
+    return replace(three_stage(), env=EnvConfig(sensors=link, randomisation=bodies))
 
 
 def paper() -> Recipe:

@@ -219,6 +219,11 @@ class Recipe:
     """The factor λ on all penalties at the first iteration; 1: no curriculum (paper III-D)."""
     penalty_until: int = 200
     """Iteration at which λ has grown to 1, by the same step each iteration."""
+    randomise_from: int = 100
+    """Iteration from which robots differ from each other; ours: a trot that learns from different
+    robots from the start stays on the spot."""
+    randomise_until: int = 300
+    """Iteration from which they differ by the whole ranges of `env.randomisation`."""
     checkpoint_every: int = 50
     """Iterations between two checkpoints."""
     threads: int = 2
@@ -238,7 +243,7 @@ class Recipe:
             penalty_start=(0.0, 1.0),
             penalty_until=(1, 1_000_000),
         )
-        for name in ("strict", "command"):
+        for name in ("strict", "command", "randomise"):
             if not 0 <= getattr(self, f"{name}_from") < getattr(self, f"{name}_until"):
                 raise GaitshiftError(f"{name}_from must be 0 or more and below {name}_until")
         if self.iterations < 1:
@@ -281,6 +286,7 @@ class Recipe:
             swing_factor=stage.swing_factor,
             command_scale=_grown(iteration, self.command_from, self.command_until),
             penalty_scale=first + (1.0 - first) * _grown(iteration, 0, self.penalty_until),
+            randomisation=_grown(iteration, self.randomise_from, self.randomise_until),
             mixed_starts=stage.mixed_starts,
         )
 

@@ -1,6 +1,6 @@
-"""Commands of a robot: speed, yaw rate, stride frequency; and a heading and a speed loop."""
+"""Commands of a robot: velocity, yaw rate, stride frequency, body height; and two loops."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,6 +18,12 @@ PAPER_SPEED = 1.2
 MOST_SPEED = 3.0
 """Greatest speed command [m/s]; ours: a joint at its speed limit swings a leg this fast."""
 
+MOST_YAW_RATE = 3.0
+"""Greatest yaw-rate command [rad/s]; ours."""
+
+MOST_HEIGHT = 0.3
+"""Furthest from the stance that a body height may be commanded [m]; ours: half of ANYmal's leg."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
@@ -29,6 +35,15 @@ class Command:
     """Commanded base angular velocity about body z [rad/s]."""
     stride_frequency: Float[np.ndarray, " N"]
     """Commanded cycles of the gait's machine per second [Hz]."""
+    lateral_speed: Float[np.ndarray, " N"] = None  # pyright: ignore[reportAssignmentType]
+    """Commanded base velocity along body y [m/s]; 0 where it is not given."""
+    body_height: Float[np.ndarray, " N"] = None  # pyright: ignore[reportAssignmentType]
+    """Commanded height of the base above that of the robot's stance [m]; 0 where not given."""
+
+    def __post_init__(self) -> None:
+        for name in ("lateral_speed", "body_height"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.zeros(len(self.forward_speed)))
 
     @property
     def stride(self) -> Float[np.ndarray, " N"]:
@@ -37,11 +52,11 @@ class Command:
 
     def of(self, ids: Int[np.ndarray, " K"]) -> "Command":
         """The command of some of the robots, in the order of `ids`."""
-        return Command(
-            forward_speed=self.forward_speed[ids],
-            yaw_rate=self.yaw_rate[ids],
-            stride_frequency=self.stride_frequency[ids],
-        )
+        return Command(**{name: getattr(self, name)[ids] for name in COMMAND_PARTS})
+
+    def sensed(self) -> dict[str, Float[np.ndarray, " N"]]:
+        """The command as fields of a `Proprioception`."""
+        return {f"{name}_command": getattr(self, name) for name in COMMAND_PARTS}
 
     @classmethod
     def straight(
@@ -53,6 +68,10 @@ class Command:
             yaw_rate=np.zeros(n),
             stride_frequency=np.full(n, float(stride_frequency)),
         )
+
+
+COMMAND_PARTS = tuple(field.name for field in fields(Command))
+"""Names of the parts of a command."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,9 +104,31 @@ class HeadingLoop:
         towards = np.clip(
             -self.lateral_gain * lateral_error, -self.heading_limit, self.heading_limit
         )
-        error = heading + towards - yaw
-        wrapped = np.arctan2(np.sin(error), np.cos(error))
-        return np.clip(self.heading_gain * wrapped, -self.yaw_rate_limit, self.yaw_rate_limit)
+        error = _wrapped(heading + towards - yaw)
+        return np.clip(self.heading_gain * error, -self.yaw_rate_limit, self.yaw_rate_limit)
+
+    def turning(
+        self,
+        yaw: Float[np.ndarray, " N"],
+        heading: Float[np.ndarray, " N"],
+        yaw_rate: float,
+    ) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+        """The next heading of robots that turn at `yaw_rate` [rad/s], and their yaw rates [rad/s].
+
+        The heading turns at that rate, and a robot that is not at it gets a correction. While it
+        turns, it stays within `heading_limit` of the robot, which may be too slow.
+        """
+        error = _wrapped(heading + yaw_rate * CONTROL_PERIOD - yaw)
+        ahead = heading
+        if yaw_rate != 0.0:
+            error = np.clip(error, -self.heading_limit, self.heading_limit)
+            ahead = yaw + error
+        most = max(self.yaw_rate_limit, abs(yaw_rate))
+        return ahead, np.clip(yaw_rate + self.heading_gain * error, -most, most)
+
+
+def _wrapped(angle: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+    return np.arctan2(np.sin(angle), np.cos(angle))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

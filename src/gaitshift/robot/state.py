@@ -168,6 +168,10 @@ class Proprioception(Moving):
     """Commanded angular velocity about body z [rad/s]."""
     stride_frequency_command: Float[np.ndarray, "*batch"] | None = None
     """Commanded cycles of the gait per second [Hz]."""
+    lateral_speed_command: Float[np.ndarray, "*batch"] | None = None
+    """Commanded velocity along body y [m/s]."""
+    body_height_command: Float[np.ndarray, "*batch"] | None = None
+    """Commanded height of the base above that of the robot's stance [m]."""
     value: Float[np.ndarray, "*batch"] | None = None
     """Value of the active policy's critic."""
 

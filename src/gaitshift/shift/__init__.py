@@ -9,6 +9,7 @@ from gaitshift.shift.graph_file import load_graph as load_graph
 from gaitshift.shift.graph_file import shipped_graphs as shipped_graphs
 from gaitshift.shift.rule import Modulation as Modulation
 from gaitshift.shift.rule import Rule as Rule
+from gaitshift.shift.standing import with_stand as with_stand
 from gaitshift.shift.statistic import AnyStatistic as AnyStatistic
 from gaitshift.shift.statistic import SearchRange as SearchRange
 from gaitshift.shift.statistic import Statistic as Statistic

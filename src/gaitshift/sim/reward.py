@@ -19,6 +19,8 @@ TRACKING_WIDTH = 0.25
 
 ADDITIONS = (
     "speed_tracking",
+    "lateral_tracking",
+    "body_height",
     "stance_feet",
     "stance_pattern",
     "slip",
@@ -42,7 +44,7 @@ class RewardConfig:
     forward_velocity: float = 10.0
     """Times exp(-(v_d - v_x)²) [s²/m²] (Table I)."""
     lateral_velocity: float = -10.0
-    """Times v_y² + v_z² [s²/m²] (Table I)."""
+    """Times (v_y - commanded v_y)² + v_z² [s²/m²] (Table I, where the command is always 0)."""
     roll_pitch_rate: float = -0.1
     """Times ω_x² + ω_y² [s²] (Table I)."""
     yaw_rate: float = -25.0
@@ -56,11 +58,19 @@ class RewardConfig:
     speed_tracking: float = 15.0
     """Times exp(-((v_d - v_x) / 0.25 m/s)²); ours: the term of Table I is so wide that a walk at
     1 m/s in place of 1.2 m/s loses only 4 % of it."""
+    lateral_tracking: float = 10.0
+    """Times exp(-((commanded v_y - v_y) / 0.25 m/s)²), in gaits for which a lateral speed may be
+    commanded; ours: the term of Table I alone is too small to be worth a step aside."""
+    body_height: float = -4000.0
+    """Times (height of the base over the lowest foot - commanded height)² [1/m²], in gaits for
+    which a height may be commanded; ours."""
     stance_feet: float = 12.0
-    """Times the share of the feet whose contact agrees with the stance of the present state; ours:
-    the bonus rewards only the instant of a change, this term each foot at every step."""
+    """Times the share of the feet whose contact agrees with the stance of the present state, and
+    its punctuality; ours: the bonus rewards only the instant of a change, this term each foot at
+    every step. A stance that is held for too long earns nothing: a slow walk would stand."""
     stance_pattern: float = 12.0
-    """Where that share is 1; ours: without it three correct feet out of four are good enough."""
+    """Times the punctuality where that share is 1; ours: without it three correct feet out of four
+    are good enough."""
     slip: float = -0.5
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
     power: float = -0.0225
@@ -102,7 +112,10 @@ def walk_reward(
     command: Command,
     *,
     stance: Float[np.ndarray, " 12"],
+    steps_aside: bool = False,
+    height_error: Float[np.ndarray, " N"] | float = 0.0,
     agreement: Float[np.ndarray, " N"],
+    in_time: Float[np.ndarray, " N"] | float = 1.0,
     chatter: Float[np.ndarray, " N"],
     action_change: Float[np.ndarray, "N 12"],
     penalty_scale: float = 1.0,
@@ -115,7 +128,10 @@ def walk_reward(
         truth: privileged state after the step.
         command: the command during the step.
         stance: q_init [rad].
+        steps_aside: whether a lateral speed may be commanded.
+        height_error: height of the base minus the commanded height [m]; 0 where none is commanded.
         agreement: share of the feet whose contact agrees with the stance of the machine's state.
+        in_time: punctuality of the stance, times the present strictness, in [0, 1].
         chatter: number of feet that came down out of place, times the present strictness.
         action_change: action minus the action before it.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
@@ -125,20 +141,25 @@ def walk_reward(
     torque, joint_position, joint_velocity = (
         sensed.need(f"joint_{name}", "the reward") for name in ("torque", "position", "velocity")
     )
-    sideways = velocity[:, 1:]
     speed_error_squared = np.square(command.forward_speed - truth.forward_speed)
+    side_error_squared = np.square(velocity[:, 1] - command.lateral_speed)
     foot_speed_squared = _squares(truth.foot_velocity_w[..., :2])
     terms = {
         "forward_velocity": config.forward_velocity * np.exp(-speed_error_squared),
-        "lateral_velocity": config.lateral_velocity * _squares(sideways),
+        "lateral_velocity": config.lateral_velocity
+        * (side_error_squared + np.square(velocity[:, 2])),
         "roll_pitch_rate": config.roll_pitch_rate * _squares(rate[:, :2]),
         "yaw_rate": config.yaw_rate * np.square(rate[:, 2] - command.yaw_rate),
         "torque": config.torque * _squares(torque),
         "joint_position": config.joint_position * _squares(joint_position - stance),
         "joint_velocity": config.joint_velocity * _squares(joint_velocity),
         "speed_tracking": config.speed_tracking * np.exp(-speed_error_squared / TRACKING_WIDTH**2),
-        "stance_feet": config.stance_feet * agreement,
-        "stance_pattern": config.stance_pattern * (agreement == 1.0),
+        "lateral_tracking": config.lateral_tracking
+        * steps_aside
+        * np.exp(-side_error_squared / TRACKING_WIDTH**2),
+        "body_height": config.body_height * np.square(height_error) + np.zeros(len(velocity)),
+        "stance_feet": config.stance_feet * in_time * agreement,
+        "stance_pattern": config.stance_pattern * in_time * (agreement == 1.0),
         "slip": config.slip * (foot_speed_squared * sensed.contact).sum(axis=1),
         "power": config.power * sensed.power,
         "chatter": config.chatter * chatter,

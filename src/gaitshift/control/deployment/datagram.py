@@ -31,7 +31,10 @@ _SENSED = (
     *("foot_position_b", "orientation", "angular_velocity_b"),
 )
 _OPTIONAL = {"velocity_b": HAS_VELOCITY, "specific_force_b": HAS_FORCE}
-_COMMANDED = ("k", "threshold", "forward_speed", "yaw_rate", "stride_frequency")
+_COMMANDED = (
+    *("k", "threshold"),
+    *("forward_speed", "yaw_rate", "stride_frequency", "lateral_speed", "body_height"),
+)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +73,10 @@ class Decision:
     """Yaw rate that was commanded [rad/s]."""
     stride_frequency: float
     """Stride frequency that was commanded [Hz]."""
+    lateral_speed: float = 0.0
+    """Lateral speed that was commanded [m/s]."""
+    body_height: float = 0.0
+    """Body height that was commanded, from that of the stance [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -56,6 +56,8 @@ RANGES = {
     "forward_speed": 1000.0,
     "yaw_rate": 1000.0,
     "stride_frequency": 1000.0,
+    "lateral_speed": 1000.0,
+    "body_height": 10.0,
 }
 """Greatest magnitude of each real number [its unit]; ours: beyond what any robot that walks shows,
 and what a simulated one can show before it counts as diverged."""
@@ -105,6 +107,8 @@ COMMAND_LAYOUT = np.dtype(
         ("forward_speed", "<f8"),
         ("yaw_rate", "<f8"),
         ("stride_frequency", "<f8"),
+        ("lateral_speed", "<f8"),
+        ("body_height", "<f8"),
         *_END,
     ]
 )

@@ -20,7 +20,16 @@ from gaitshift.control.estimator import Estimation
 from gaitshift.control.switcher import Switcher, uncounted
 from gaitshift.data import check_ranges
 from gaitshift.errors import GaitshiftError
-from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, Command, HeadingLoop, SpeedLoop
+from gaitshift.robot.command import (
+    COMMAND_PARTS,
+    CONTROL_PERIOD,
+    MOST_HEIGHT,
+    MOST_SPEED,
+    MOST_YAW_RATE,
+    Command,
+    HeadingLoop,
+    SpeedLoop,
+)
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift import Decision
 
@@ -42,14 +51,27 @@ class DeploymentConfig:
 
     speed: float | None = None
     """Commanded forward speed [m/s]; None: that of the present gait."""
+    lateral_speed: float = 0.0
+    """Commanded lateral speed, to the left [m/s]."""
+    yaw_rate: float = 0.0
+    """Commanded yaw rate, to the left [rad/s]; at 0 the robot keeps its heading."""
+    body_height: float | None = None
+    """Commanded body height, from that of the stance [m]; None: that of the present gait."""
     watchdog: float = 0.05
     """Longest time without valid sensors before the soft stop [s]; ours: five control steps, in
     which a leg moves by less than a fifth of a stride."""
 
     def __post_init__(self) -> None:
-        check_ranges(self, watchdog=WATCHDOG_RANGE)
+        check_ranges(
+            self,
+            lateral_speed=(-MOST_SPEED, MOST_SPEED),
+            yaw_rate=(-MOST_YAW_RATE, MOST_YAW_RATE),
+            watchdog=WATCHDOG_RANGE,
+        )
         if self.speed is not None:
             check_ranges(self, speed=(0.0, MOST_SPEED))
+        if self.body_height is not None:
+            check_ranges(self, body_height=(-MOST_HEIGHT, MOST_HEIGHT))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -220,18 +242,23 @@ class Deployment:
             sensed,
             time=self._steps * CONTROL_PERIOD,
             mass=self.controller.robot.mass,
-            forward_speed_command=self._wanted.forward_speed,
-            yaw_rate_command=self._wanted.yaw_rate,
-            stride_frequency_command=self._wanted.stride_frequency,
+            **self._wanted.sensed(),
         )
 
     def _command_of(self, sensed: Proprioception) -> Command:
         own = self.controller.repertoire.own_command(self.controller.gait)
-        speed = self.config.speed
+        config = self.config
+        self._heading, turn = self._heading_loop.turning(
+            self._yaw(sensed), self._heading, config.yaw_rate
+        )
         return Command(
-            forward_speed=own.forward_speed if speed is None else np.full(1, speed),
-            yaw_rate=self._heading_loop.yaw_rate(self._yaw(sensed), self._heading),
+            forward_speed=own.forward_speed if config.speed is None else np.full(1, config.speed),
+            yaw_rate=turn,
             stride_frequency=own.stride_frequency,
+            lateral_speed=np.full(1, config.lateral_speed),
+            body_height=(
+                own.body_height if config.body_height is None else np.full(1, config.body_height)
+            ),
         )
 
     def _yaw(self, sensed: Proprioception) -> Float[np.ndarray, " 1"]:
@@ -247,9 +274,9 @@ class Deployment:
             stance_shown=bool(shown[0]),
             k=float(decision.k[0]),
             threshold=float(decision.threshold[0]),
-            forward_speed=float(seen.need("forward_speed_command", "a datagram")[0]),
-            yaw_rate=float(seen.need("yaw_rate_command", "a datagram")[0]),
-            stride_frequency=float(seen.need("stride_frequency_command", "a datagram")[0]),
+            **{
+                name: float(seen.need(f"{name}_command", "a datagram")[0]) for name in COMMAND_PARTS
+            },
         )
 
     def _stopping(self, newest: Sensors, now: float, began: float, stop: SoftStop) -> bytes:

@@ -10,11 +10,15 @@ is checked when it is read, and no code in it runs. It holds
   frequency; transitions with their own dwell keep their proportion. `dwell` alone if left out;
 - `speed` [m/s, the paper's 1.2 if left out] and `speed_range` [m/s, `speed` alone if left out]:
   the nominal speed, and the range of the command;
+- `lateral_speed` [m/s, 0 if left out]: the greatest command to either side;
+- `height` [m, from that of the robot's stance, 0 if left out] and `height_range` [m]: the nominal
+  body height, and the range of the command; without a range the height is not commanded;
 - `ideal_phase`: touchdown of each foot [fraction of the stride, 0 to below 1];
 - `[[state]]`, the first one initial: `name`, and `stance`, the feet down; or `name` and
   `accepting = true` for a state in which the run ends;
 - `[[transition]]`: `from`, `to`, `down` (feet that must touch), `up` (feet that must not; the
   others are free), and if wanted `dwell`, `swing_height` and `bonus` (factor on the shared bonus).
+  A gait of one state without transitions stands; its `speed` may be 0.
 """
 
 from pathlib import Path

@@ -8,7 +8,7 @@ import numpy as np
 from gaitshift.control.deployment import Link, Timing
 from gaitshift.control.deployment.timing import Pace, uninterrupted
 from gaitshift.lab.log import Log
-from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.command import COMMAND_PARTS, CONTROL_PERIOD
 from gaitshift.sim.channel import Channel
 from gaitshift.sim.simulated_robot import SimulatedRobot
 
@@ -41,9 +41,7 @@ class RobotRecorder:
         sensed = replace(
             world.sensed,
             time=(len(self._steps) + 1) * CONTROL_PERIOD,
-            forward_speed_command=np.array([decided.forward_speed]),
-            yaw_rate_command=np.array([decided.yaw_rate]),
-            stride_frequency_command=np.array([decided.stride_frequency]),
+            **{f"{n}_command": np.array([getattr(decided, n)]) for n in COMMAND_PARTS},
         )
         self._steps.append(
             Log(

@@ -14,7 +14,13 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.gait_analysis import measure
 from gaitshift.lab.log import Log
-from gaitshift.robot.command import CONTROL_PERIOD, MOST_SPEED, SpeedLoop
+from gaitshift.robot.command import (
+    CONTROL_PERIOD,
+    MOST_HEIGHT,
+    MOST_SPEED,
+    MOST_YAW_RATE,
+    SpeedLoop,
+)
 from gaitshift.sim.push import PushConfig
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.simulator import SimulatorChoice, simulator_maker
@@ -48,6 +54,12 @@ class EvaluationConfig(SimulatorChoice):
     """Commanded forward speed [m/s]; by default the gait's nominal speed."""
     stride_frequency: float | None = None
     """Commanded stride frequency [Hz]; by default the gait's nominal frequency."""
+    lateral_speed: float = 0.0
+    """Commanded lateral speed, to the left [m/s]."""
+    yaw_rate: float | None = None
+    """Commanded yaw rate, to the left [rad/s]; by default robots keep to their lines."""
+    body_height: float | None = None
+    """Commanded body height, from that of the stance [m]; by default the gait's nominal height."""
     open_loop: bool = False
     """Give the policy the commanded speed directly; by default a slow speed loop adjusts it so that
     the mean speed equals the commanded speed."""
@@ -67,6 +79,14 @@ class EvaluationConfig(SimulatorChoice):
             raise GaitshiftError(f"seed must be 0 or larger, got {self.seed}")
         if self.speed is not None and not 0 <= self.speed <= MOST_SPEED:
             raise GaitshiftError(f"speed must be 0 to {MOST_SPEED:g} m/s, got {self.speed}")
+        for name, most in (
+            ("lateral_speed", MOST_SPEED),
+            ("yaw_rate", MOST_YAW_RATE),
+            ("body_height", MOST_HEIGHT),
+        ):
+            value = getattr(self, name)
+            if value is not None and not -most <= value <= most:
+                raise GaitshiftError(f"{name} must be -{most:g} to {most:g}, got {value}")
         frequency, most = self.stride_frequency, 1 / CONTROL_PERIOD
         if frequency is not None and not 0 < frequency <= most:
             raise GaitshiftError(
@@ -129,6 +149,9 @@ def run_controller(
         seconds=config.seconds,
         speed=config.speed,
         stride_frequency=config.stride_frequency,
+        lateral_speed=config.lateral_speed,
+        yaw_rate=config.yaw_rate,
+        body_height=config.body_height,
         push=PushConfig(force=config.push),
         speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
         values=values,

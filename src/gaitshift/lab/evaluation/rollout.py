@@ -25,6 +25,12 @@ class RolloutConfig:
     """Commanded forward speed [m/s]; None: that of each robot's gait."""
     stride_frequency: float | None = None
     """Commanded stride frequency [Hz]; None: that of each robot's gait."""
+    lateral_speed: float = 0.0
+    """Commanded lateral speed, to the left [m/s]."""
+    body_height: float | None = None
+    """Commanded body height, from that of the stance [m]; None: that of each robot's gait."""
+    yaw_rate: float | None = None
+    """Commanded yaw rate, to the left [rad/s]; None: robots keep to their lines along x."""
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
     """Keeps robots on their line along x."""
     speed_loop: SpeedLoop = field(default_factory=SpeedLoop)
@@ -79,6 +85,7 @@ class Walk:
         """Control steps so far."""
         self.decision: Decision | None = None
         """The switcher's decision in the last step."""
+        self._heading: Float[np.ndarray, " N"] = np.zeros(n)
         self.wanted = self._command()
         """The command in the last step, before the speed loop's trim."""
         self._estimation = Estimation(controller.robot, n)
@@ -116,9 +123,7 @@ class Walk:
         self.sensed = replace(
             sensed,
             time=self.time,
-            forward_speed_command=self.wanted.forward_speed,
-            yaw_rate_command=self.wanted.yaw_rate,
-            stride_frequency_command=self.wanted.stride_frequency,
+            **self.wanted.sensed(),
             value=controller.value() if self.config.values else None,
         )
         if self.switcher is not None:
@@ -133,13 +138,29 @@ class Walk:
     def _command(self) -> Command:
         config, controller, n = self.config, self.controller, self.controller.n
         own = controller.repertoire.own_command(controller.gait)
-        lateral = self.world.truth.base_position_w[:, 1] - self._start_y
-        speed, frequency = config.speed, config.stride_frequency
+
+        def given(value: float | None, otherwise: Float[np.ndarray, " N"]) -> np.ndarray:
+            return otherwise if value is None else np.full(n, value)
+
         return Command(
-            forward_speed=own.forward_speed if speed is None else np.full(n, speed),
-            yaw_rate=config.heading_loop.yaw_rate(self.world.sensed.yaw, np.zeros(n), lateral),
-            stride_frequency=own.stride_frequency if frequency is None else np.full(n, frequency),
+            forward_speed=given(config.speed, own.forward_speed),
+            yaw_rate=self._turn(),
+            stride_frequency=given(config.stride_frequency, own.stride_frequency),
+            lateral_speed=np.full(n, config.lateral_speed),
+            body_height=given(config.body_height, own.body_height),
         )
+
+    def _turn(self) -> Float[np.ndarray, " N"]:
+        """Yaw rates that keep robots on their lines along x, or turn them as commanded."""
+        config, yaw = self.config, self.world.sensed.yaw
+        if config.yaw_rate is not None:
+            self._heading, turn = config.heading_loop.turning(yaw, self._heading, config.yaw_rate)
+            return turn
+        self._heading = yaw
+        aside = self.world.truth.base_position_w[:, 1] - self._start_y
+        if config.lateral_speed != 0:
+            aside = 0.0  # there is no line to keep
+        return config.heading_loop.yaw_rate(yaw, np.zeros(len(yaw)), aside)
 
 
 def rollout(

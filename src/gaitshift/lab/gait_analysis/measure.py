@@ -51,6 +51,10 @@ def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
         float(turn[:, 1].std(dtype=float)),
         float(too_fast.mean()),
         float(robot.motor.is_saturated(torque, joint_speed).mean()),
+        float(log.truth.velocity_b[..., 1][alive].mean(dtype=float)),
+        float(sensed.need("angular_velocity_b", "gait figures")[..., 2][alive].mean(dtype=float)),
+        float(height.mean(dtype=float)) - robot.stance_height,
+        _drift(sample),
     )
     return dict(zip(_NAMES, values, strict=True))
 
@@ -68,6 +72,10 @@ _NAMES = (
     "pitch_rate_sd",
     "overspeed",
     "saturation",
+    "lateral_speed_mean",
+    "yaw_rate_mean",
+    "height_mean",
+    "drift",
 )
 
 
@@ -99,6 +107,15 @@ def lateral_error(log: Log) -> Figure:
             0.95,
         )
     )
+
+
+def _drift(sample: Sample) -> Figure:
+    """Furthest that a robot on its feet is at the end from where it was after the warm-up [m]."""
+    upright = sample.alive[-1]
+    if not upright.any():
+        return None
+    place = sample.log.truth.base_position_w[:, upright, :2].astype(float)
+    return float(np.linalg.norm(place[-1] - place[0], axis=-1).max())
 
 
 def _heading_drift(sample: Sample) -> Figure:
@@ -225,6 +242,11 @@ def measure(
     - `roll_rate_sd`, `pitch_rate_sd` [rad/s]: spread of the body's angular velocity about x and y.
     - `overspeed`: share of steps in which a joint is faster than its motor without load.
     - `saturation`: share of joints and steps in which a motor gives all its torque.
+    - `lateral_speed_mean` [m/s], `yaw_rate_mean` [rad/s]: mean velocity along body y, and mean
+      angular velocity about body z.
+    - `height_mean` [m]: mean height of the base over the lowest foot, from that of the stance.
+    - `drift` [m]: greatest distance over robots between the places after the warm-up and at the
+      end.
     - `slip` [m/s]: mean horizontal speed of the feet in contact.
     - `pattern_fraction`: share of steps whose contacts are a stance set of the gait's machine.
     - `cycles_per_s` [Hz]: full cycles of the machine, counted by entries into its first state.
@@ -237,7 +259,7 @@ def measure(
     - `flight_fraction`: share of steps with no foot down.
     - `lateral_error_p95` [m]: 95th percentile of the distance from the line, at the end.
     - `stalled`: share of robots on their feet at the end whose machine has not changed its state
-      for 2 s: they stand.
+      for 2 s: they stand. 0 for a gait that stands by its definition.
     - `verdict`: `gait`, the name by the contacts alone, or "none"; `scores` of every known gait;
       `clean`, whether the name is that of the active gait and all its limits are met; `misses`,
       the limits that are not met.
@@ -256,7 +278,7 @@ def measure(
         **base_figures(sample, robot),
         **feet_figures(sample, machines),
         "lateral_error_p95": lateral_error(log),
-        "stalled": stalled(log),
+        "stalled": 0.0 if machines[sample.gait()].stands else stalled(log),
     }
     gait = sample.gait()
     scores = gait_scores(sample, machines.values())

@@ -19,6 +19,10 @@ LEAST_SCORE = 0.2
 shows its stance sets half of the time, with feet that touch twice a cycle, scores 0.25."""
 
 
+UNSTEADY = 10.0
+"""What steps off its stance cost a gait that stands; ours: feet that shiver do not stand."""
+
+
 def gait_scores(sample: Sample, others: Iterable[RewardMachine] = ()) -> dict[str, float]:
     """Score in [0, 1] of every known gait, and of `others`, by name.
 
@@ -31,19 +35,33 @@ def gait_scores(sample: Sample, others: Iterable[RewardMachine] = ()) -> dict[st
     - pattern: `share_in_order`;
     - firmness: touchdowns that end a swing over all onsets, of the foot that bounces most.
 
-    For a gait with a leading side the better score of the gait and its mirror image counts.
+    For a gait with a leading side the better score of the gait and its mirror image counts. A gait
+    that stands loses 1 for each tenth of the steps that do not show its stance, or are of robots
+    with feet that step.
     """
     machines = {name: gaits.load(name) for name in gaits.names()}
     machines |= {machine.name: machine for machine in others}
     phases = Phases.of(sample.touchdowns, sample.period)
     firmness = _firmness(sample)
-    return {name: firmness * _score(sample, phases, machine) for name, machine in machines.items()}
+    return {
+        name: _standing(sample, machine)
+        if machine.stands
+        else firmness * _score(sample, phases, machine)
+        for name, machine in machines.items()
+    }
 
 
 def name_gait(scores: Mapping[str, float]) -> str:
     """The gait with the best score, or `NONE` where that is below `LEAST_SCORE`."""
     best = max(scores, key=lambda name: scores[name])
     return best if scores[best] >= LEAST_SCORE else NONE
+
+
+def _standing(sample: Sample, machine: RewardMachine) -> float:
+    stance = label_of(sample.contact) == feet_label(machine.states[0].stance)
+    quiet = ~sample.touchdowns.any(axis=(0, 2))
+    share = float((stance & sample.alive & quiet).sum() / max(1, sample.alive.sum()))
+    return max(0.0, 1.0 - UNSTEADY * (1.0 - share))
 
 
 def _score(sample: Sample, phases: Phases, machine: RewardMachine) -> float:

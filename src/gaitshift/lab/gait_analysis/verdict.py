@@ -59,6 +59,10 @@ OTHERS = Limits(
 )
 """Of every other gait."""
 
+STAND_PATTERN, STAND_DRIFT = 0.99, 0.02
+"""Of a gait that stands: least share of steps on all feet of its stance, and greatest drift [m]; it
+has the limits of survival and speed of the others, and none that are about strides."""
+
 FIRST_GAITS = ("trot", "pace", "bound")
 """The paper's."""
 
@@ -71,7 +75,7 @@ def limits_of(gait: str) -> Limits:
     return LIMITS.get(gait, OTHERS)
 
 
-_UNITS = {"speed_error": "m/s", "phase_error": "stride", "clearance": "m"}
+_UNITS = {"speed_error": "m/s", "phase_error": "stride", "clearance": "m", "drift": "m"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,6 +118,14 @@ def checks(figures: Mapping[str, Any], machine: RewardMachine) -> tuple[Check, .
     compared where the gait is its own mirror image.
     """
     limits = limits_of(machine.name)
+    if machine.stands:
+        pattern, drift = figures["pattern_fraction"], figures["drift"]
+        return (
+            _whole(limits, "survival", figures["survival"], "at_least"),
+            _whole(limits, "speed_error", figures["speed_error"], "at_most"),
+            Check(figure="pattern_fraction", value=pattern, bound="at_least", limit=STAND_PATTERN),
+            Check(figure="drift", value=drift, bound="at_most", limit=STAND_DRIFT),
+        )
     touchdowns = figures["touchdowns_per_cycle"]
     touchdown_error = None if touchdowns is None else np.abs(np.array(touchdowns) - 1.0)
     phase = np.array([np.nan if x is None else x for x in figures["phase"]])

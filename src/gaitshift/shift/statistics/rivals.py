@@ -141,7 +141,7 @@ class Slip:
 
 @dataclass(frozen=True, kw_only=True)
 class SpeedCommand:
-    """The commanded forward speed [m/s]."""
+    """The commanded speed over the ground, in any direction [m/s]."""
 
     unit = "m/s"
     width = 1
@@ -152,8 +152,13 @@ class SpeedCommand:
         """Nothing to remember."""
 
     def step(self, state: None, sensed: Proprioception) -> tuple[None, Float[np.ndarray, "N 1"]]:
-        """The command of this step."""
-        return None, sensed.need("forward_speed_command", "speed")[:, None]
+        """The command of this step; without a lateral command it is the forward speed."""
+        forward, lateral = (
+            sensed.need("forward_speed_command", "speed"),
+            sensed.lateral_speed_command,
+        )
+        speed = forward if lateral is None else np.hypot(forward, lateral)
+        return None, speed[:, None]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,12 +1,14 @@
 """The last touches of the feet, tracked by leg odometry, from which the terrain is estimated."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import GRAVITY, Proprioception
+from gaitshift.shift.statistics.contacts import ContactFilter, ContactState
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -21,18 +23,30 @@ class OdometryState:
     """Feet from the base, a step ago [m]."""
     contact: Bool[np.ndarray, "N 4"]
     """Contacts a step ago."""
+    stands: Bool[np.ndarray, "N 4"]
+    """Feet by which the base moved."""
+    flight: Float[np.ndarray, " N"]
+    """Time since a foot last stood [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LegOdometry:
     """Feet that touch in two steps running stand still: the base moves as they seem to move back.
 
-    With no such foot the base flies on as it did, and falls. Errors add up with the distance: it is
-    good for the few strides that conditions look back on.
+    A foot that is felt in its swing would carry the base along. So a foot stands only where the
+    base velocity that it shows is near the last one, or near that which another foot shows. With no
+    such foot the base flies on as it did, and falls. Errors add up with the distance: it is good
+    for the few strides that conditions look back on.
     """
 
     smoothing: float = 0.03
-    """The velocity, which only flights use, forgets by e in this time [s]."""
+    """The velocity forgets by e in this time [s]."""
+    agreement: float = 1.0
+    """Greatest difference of velocities that agree [m/s]; ours: a swinging foot moves at twice the
+    speed of the base."""
+    longest_flight: float = 0.3
+    """After this time any foot that is felt stands [s]; ours: twice the longest flight of a shipped
+    gait."""
 
     def start(self, n: int) -> OdometryState:
         """State of n robots at the origin, in the air and at rest."""
@@ -41,6 +55,8 @@ class LegOdometry:
             velocity=np.zeros((n, 3)),
             foot=np.zeros((n, 4, 3)),
             contact=np.zeros((n, 4), dtype=bool),
+            stands=np.zeros((n, 4), dtype=bool),
+            flight=np.full(n, np.inf),
         )
 
     def step(
@@ -48,7 +64,7 @@ class LegOdometry:
     ) -> tuple[OdometryState, Float[np.ndarray, "N 4 3"]]:
         """The base after this step, and where each foot is in the same frame [m]."""
         foot = upright(sensed)
-        stands = sensed.contact & state.contact
+        stands = self._standing(state, sensed, foot)
         count = stands.sum(axis=1)[:, None]
         back = np.where(stands[..., None], state.foot - foot, 0.0).sum(axis=1)
         by_feet = back / np.maximum(count, 1)
@@ -56,12 +72,41 @@ class LegOdometry:
         fall = np.array([0.0, 0.0, GRAVITY * period])
         by_flight = (state.velocity - 0.5 * fall) * period
         move = np.where(count > 0, by_feet, by_flight)
-        share = min(1.0, period / self.smoothing)
+        lost = (state.flight > self.longest_flight)[:, None]
+        share = np.where(lost, 1.0, min(1.0, period / self.smoothing))
         by_feet_velocity = state.velocity + share * (by_feet / period - state.velocity)
         velocity = np.where(count > 0, by_feet_velocity, state.velocity - fall)
         base = state.base + move
-        after = OdometryState(base=base, velocity=velocity, foot=foot, contact=sensed.contact)
+        after = OdometryState(
+            base=base,
+            velocity=velocity,
+            foot=foot,
+            contact=sensed.contact,
+            stands=stands,
+            flight=np.where(count[:, 0] > 0, 0.0, state.flight + period),
+        )
         return after, base[:, None] + foot
+
+    def _standing(
+        self, state: OdometryState, sensed: Proprioception, foot: Float[np.ndarray, "N 4 3"]
+    ) -> Bool[np.ndarray, "N 4"]:
+        """Feet that touch in two steps and show a base velocity that something else shows too."""
+        touch = sensed.contact & state.contact
+        shown = (state.foot - foot) / sensed.period
+        far = _square(shown - state.velocity[:, None]) > self.agreement**2
+        if not (touch & far).any():
+            return touch
+        apart = _square(shown[:, :, None] - shown[:, None])
+        agree = (apart < self.agreement**2) & touch[:, :, None] & touch[:, None]
+        has_fellow = agree.sum(axis=-1) > 1
+        lost = state.flight > self.longest_flight
+        return touch & (~far | has_fellow | lost[:, None])
+
+
+def _square(vector: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch"]:
+    # Written out, so that one robot gives the same bits alone and in a batch.
+    x, y, z = (vector[..., axis] for axis in range(3))
+    return x * x + y * y + z * z
 
 
 def upright(sensed: Proprioception) -> Float[np.ndarray, "N 4 3"]:
@@ -91,8 +136,8 @@ class TouchState:
     """State of the odometry."""
     touch: Float[np.ndarray, "N 4 K 3"]
     """Last touches of each foot, the latest first, in the odometry's frame [m]; NaN before."""
-    time_up: Float[np.ndarray, "N 4"]
-    """Time since each foot last touched [s]."""
+    feet: ContactState
+    """Which feet stand."""
 
     @property
     def points(self) -> Float[np.ndarray, "N P 3"]:
@@ -109,21 +154,25 @@ class Touches:
     """Number of touches of each foot in memory."""
     least_swing: float
     """A foot that touches again sooner has bounced: it is the same touch [s]."""
+    least_stance: float = 0.02
+    """A foot that stands for less time, by the odometry, has not touched [s]; ours: false contacts
+    last some 20 ms."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.kept <= 100:
             raise GaitshiftError(f"touches must be 1 to 100 for each foot, got {self.kept}")
-        if not 0.0 <= self.least_swing < np.inf:
-            raise GaitshiftError(
-                f"least_swing must be finite and 0 s or more, got {self.least_swing:g}"
-            )
+        _ = self._filter
+
+    @cached_property
+    def _filter(self) -> ContactFilter:
+        return ContactFilter(least_stance=self.least_stance, least_swing=self.least_swing)
 
     def start(self, n: int) -> TouchState:
         """State of n robots before any touch."""
         return TouchState(
             odometry=LegOdometry().start(n),
             touch=np.full((n, 4, self.kept, 3), np.nan),
-            time_up=np.full((n, 4), np.inf),
+            feet=self._filter.start(n),
         )
 
     def step(
@@ -134,14 +183,14 @@ class Touches:
         The last touch of a foot follows the foot while it stands.
         """
         odometry, foot = LegOdometry().step(state.odometry, sensed)
-        contact = sensed.contact
-        new = contact & (state.time_up >= self.least_swing)
+        feet = self._filter.step(state.feet, odometry.stands, sensed.period)
+        new = feet.down & ~state.feet.down
         touch = state.touch.copy()
         if new.any():
             touch[:, :, 1:] = np.where(new[..., None, None], touch[:, :, :-1], touch[:, :, 1:])
-        touch[:, :, 0] = np.where(contact[..., None], foot, touch[:, :, 0])
-        time_up = np.where(contact, 0.0, state.time_up + sensed.period)
-        return TouchState(odometry=odometry, touch=touch, time_up=time_up), new, foot
+        stands = feet.down & sensed.contact
+        touch[:, :, 0] = np.where(stands[..., None], foot, touch[:, :, 0])
+        return TouchState(odometry=odometry, touch=touch, feet=feet), new, foot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,7 +13,7 @@ from gaitshift.lab.evaluation.demo import RUN_OUT, START, WIDTH, DemoConfig
 from gaitshift.lab.evaluation.rollout import Recorder, RolloutConfig, Walk, step_of
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import Robot
-from gaitshift.shift import GaitGraph, Oracle, between, load_graph, tuned
+from gaitshift.shift import GaitGraph, Oracle, between, load_graph, tuned, with_stand
 from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.show.geometry import Frame
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
@@ -25,6 +25,9 @@ MOST_ROBOTS = 16
 
 PUSH_TIME = 0.2
 """Duration of a push [s]."""
+
+STAND = "stand"
+"""The gait at zero command, where it has a policy."""
 
 LYING = 2.0
 """Time from the first robot's fall until all restart [s]."""
@@ -56,6 +59,12 @@ class LiveConfig:
     """Commanded speed [m/s]; None: that of the gait."""
     stride_frequency: float | None = None
     """Commanded stride frequency [Hz]; None: that of the gait."""
+    lateral_speed: float = 0.0
+    """Commanded lateral speed, to the left [m/s]."""
+    yaw_rate: float | None = None
+    """Commanded yaw rate, to the left [rad/s]; None: robots keep to their lines."""
+    body_height: float | None = None
+    """Commanded body height, from that of the stance [m]; None: that of the gait."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.robots <= MOST_ROBOTS:
@@ -126,7 +135,7 @@ class LiveRun:
         if config.is_autonomous != before.is_autonomous or not isinstance(switcher, Autonomous):
             self._walk.switcher = self._switcher(config)
         elif config.graph.statistics == before.graph.statistics:
-            switcher.retune(config.graph)
+            switcher.retune(self._graph(config))
         else:
             self._walk.switcher = self._switcher(config)
         self._walk.config = self._rollout(config)
@@ -206,7 +215,7 @@ class LiveRun:
     def _switcher(self, config: LiveConfig) -> Autonomous | None:
         if not config.is_autonomous:
             return None
-        graph = config.graph
+        graph = self._graph(config)
         missing = {*graph.gaits} - {*self._policies}
         if missing:
             raise GaitshiftError(f"gait must be one with a policy, got '{min(missing)}'")
@@ -217,10 +226,21 @@ class LiveRun:
             )
         return Autonomous(graph, config.robots)
 
+    def _graph(self, config: LiveConfig) -> GaitGraph:
+        """The gait graph, and standing at zero command where there is a policy for it."""
+        graph = config.graph
+        known = STAND in self._policies and STAND not in graph.gaits
+        return with_stand(graph, STAND) if known else graph
+
     @staticmethod
     def _rollout(config: LiveConfig) -> RolloutConfig:
         return RolloutConfig(
-            seconds=np.inf, speed=config.speed, stride_frequency=config.stride_frequency
+            seconds=np.inf,
+            speed=config.speed,
+            stride_frequency=config.stride_frequency,
+            lateral_speed=config.lateral_speed,
+            yaw_rate=config.yaw_rate,
+            body_height=config.body_height,
         )
 
 

@@ -103,6 +103,14 @@ class Orders:
 
         button.on_click(enqueue)
 
+    def on_key(self, command: Any, order: Callable[[], None]) -> None:
+        """Gives the order whenever the key of the command is pressed."""
+
+        def enqueue(_: Any) -> None:
+            self._waiting.put(order)
+
+        command.on_trigger(enqueue)
+
     def on_choice(self, group: Any, order: Callable[[str], None]) -> None:
         """Gives the order with the name of the button that is clicked."""
 

@@ -97,12 +97,20 @@ class Curriculum:
     """The share of the gait's ranges that commands are drawn from, 0 to 1."""
     penalty_scale: float = 1.0
     """The factor λ on all penalties, 0 to 1 (paper III-D, where it is always 1)."""
+    randomisation: float = 1.0
+    """How far the ranges of what differs from robot to robot reach, 0 to 1."""
     mixed_starts: float = 0.0
     """The share of episodes that begin in the midst of a stride that is no gait's
     (`gaitshift.sim.env.episodes`), of those that begin while others go on, 0 to 1."""
 
     def __post_init__(self) -> None:
-        for name in ("strictness", "command_scale", "penalty_scale", "mixed_starts"):
+        for name in (
+            "strictness",
+            "command_scale",
+            "penalty_scale",
+            "randomisation",
+            "mixed_starts",
+        ):
             if not 0 <= getattr(self, name) <= 1:
                 raise GaitshiftError(f"{name} must be 0 to 1, got {getattr(self, name)}")
         if not self.swing_factor > 0:

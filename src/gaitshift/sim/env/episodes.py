@@ -49,17 +49,18 @@ class Commander:
         """
         config = self._config
         due = np.flatnonzero(age % config.command_interval == config.command_interval - 1)
-        if due.size and config.heading_range > 0:
+        turns = config.heading_range > 0 and not self._machine.stands
+        if due.size and turns:
             turn = self._rng.uniform(-config.heading_range, config.heading_range, due.size)
             self.heading[due] = self._line[due] + turn
         if due.size:
             self._draw(due, scale)
-        if config.heading_range > 0:
+        if turns:
             yaw_rate = config.heading_loop.yaw_rate(yaw, self.heading)
             self.command = replace(self.command, yaw_rate=yaw_rate)
 
     def ranges(self) -> dict[str, Any]:
-        """Nominal value and range of forward speed and stride frequency."""
+        """Nominal value and range of every part of the command."""
         own, machine = self._own(1), self._machine
         speed, frequency = float(own.forward_speed[0]), float(own.stride_frequency[0])
         slow, fast = (1.0 / (machine.stride(d) * CONTROL_PERIOD) for d in machine.dwell_range[::-1])
@@ -69,16 +70,20 @@ class Commander:
             "speed_range": list(machine.speed_range) if varied else [speed, speed],
             "stride_frequency": frequency,
             "stride_frequency_range": [slow, fast] if varied else [frequency, frequency],
+            "lateral_speed": machine.lateral_speed if varied else 0.0,
+            "body_height": machine.height,
+            "height_range": list(machine.height_range if varied else [machine.height] * 2),
         }
 
     def _own(self, n: int) -> Command:
         """Straight ahead at the config's speed, or the gait's, and the gait's frequency."""
         machine, speed = self._machine, self._config.forward_speed
         frequency = 1.0 / (machine.stride() * CONTROL_PERIOD)
-        return Command.straight(n, machine.speed if speed is None else speed, frequency)
+        straight = Command.straight(n, machine.speed if speed is None else speed, frequency)
+        return replace(straight, body_height=np.full(n, machine.height))
 
     def _draw(self, ids: Int[np.ndarray, " K"], scale: float) -> None:
-        """Gives these robots a speed and a stride frequency, each drawn or nominal."""
+        """Gives these robots a command, of which each part is drawn or nominal."""
         share = self._config.command_share
         if share == 0 or scale == 0:
             return
@@ -97,6 +102,22 @@ class Commander:
             drawn[1], 1.0 / (strides * CONTROL_PERIOD), own.stride_frequency
         )
         self.command = replace(self.command, forward_speed=speeds, stride_frequency=frequencies)
+        if machine.lateral_speed > 0:
+            self._draw_one(
+                ids, "lateral_speed", (-machine.lateral_speed, machine.lateral_speed), scale
+            )
+        if machine.has_height:
+            self._draw_one(ids, "body_height", machine.height_range, scale)
+
+    def _draw_one(
+        self, ids: Int[np.ndarray, " K"], name: str, ends: tuple[float, float], scale: float
+    ) -> None:
+        """Gives these robots a part of the command that is drawn or nominal."""
+        home, rng = getattr(self._own(len(ids)), name), self._rng
+        drawn = rng.random(len(ids)) < self._config.command_share
+        asked = getattr(self.command, name).copy()
+        asked[ids] = np.where(drawn, home + scale * (rng.uniform(*ends, len(ids)) - home), home)
+        self.command = replace(self.command, **{name: asked})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -14,7 +14,7 @@ from gaitshift.control.estimator import Estimation
 from gaitshift.control.observation import GaitState, Observation
 from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
-from gaitshift.robot.command import ACTION_LIMIT
+from gaitshift.robot.command import ACTION_LIMIT, Command
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged, Proprioception
 from gaitshift.sim.env.config import Curriculum, EnvConfig
@@ -121,7 +121,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             truth,
             command,
             stance=self._stance,
+            steps_aside=self.machine.lateral_speed > 0,
+            height_error=self._height_error(ideal, command),
             agreement=agreement,
+            in_time=1.0 - asked.strictness * (1.0 - self._punctuality(command)),
             chatter=asked.strictness * chatter,
             action_change=action - before.last_action,
             penalty_scale=asked.penalty_scale,
@@ -191,7 +194,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _restart(self, ids: Int[np.ndarray, " K"]) -> None:
         rng, config, count = self._rng, self.config, len(ids)
-        self.world.redraw(ids, rng)
+        self.world.redraw(ids, rng, self.curriculum.randomisation)
         moving, start = self._draw_mixed(ids)
         yaw = rng.choice((0.0, np.pi), count)  # edges lie across x: up and down, head on
         velocity = np.zeros((count, 3))
@@ -258,6 +261,20 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             touch_height=start.touch_height,
         )
         self._state = self._state.with_robots(ids, going)
+
+    def _punctuality(self, command: Command) -> Float[np.ndarray, " N"]:
+        """Of a change in the next step: below 1 where a stance has been held for too long."""
+        machine, state = self.machine, self._state
+        dwell = machine.dwell_for(command.stride)
+        return machine.punctuality(state.machine_state, state.steps_in_state, dwell)
+
+    def _height_error(
+        self, ideal: Proprioception, command: Command
+    ) -> Float[np.ndarray, " N"] | float:
+        """Height of the base minus the commanded height [m], where the gait takes a command."""
+        if not self.machine.has_height:
+            return 0.0
+        return ideal.base_height - (self.robot.stance_height + command.body_height)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
         if self._is_level:

@@ -108,11 +108,20 @@ class Models:
         for robot, drawn in (before.drawn if before else {}).items():
             self._set(robot, drawn)
 
-    def draw(self, ids: Int[np.ndarray, " K"], rng: np.random.Generator) -> None:
-        """Draws the robots `ids` anew, in this order."""
-        ranges = self.config.ranges()
+    def draw(
+        self, ids: Int[np.ndarray, " K"], rng: np.random.Generator, share: float = 1.0
+    ) -> None:
+        """Draws the robots `ids` anew, in this order.
+
+        `share` shrinks all ranges towards the values of a robot that differs in nothing, 0 to 1.
+        """
+        ranges, alike = self.config.ranges(), SAME.ranges()
         for robot in map(int, ids):
-            self._set(robot, {name: float(rng.uniform(*two)) for name, two in ranges.items()})
+            drawn = {name: float(rng.uniform(*two)) for name, two in ranges.items()}
+            self._set(
+                robot,
+                {n: alike[n][0] + share * (value - alike[n][0]) for n, value in drawn.items()},
+            )
 
     def _set(self, robot: int, drawn: dict[str, float]) -> None:
         self.drawn[robot] = drawn

@@ -116,13 +116,15 @@ class World:
         if state is not None:
             self.set_state(*state)
 
-    def redraw(self, ids: Int[np.ndarray, " K"], rng: np.random.Generator) -> None:
+    def redraw(
+        self, ids: Int[np.ndarray, " K"], rng: np.random.Generator, share: float = 1.0
+    ) -> None:
         """Draws what differs from robot to robot anew for these, without moving them.
 
-        Draws nothing where nothing differs.
+        Draws nothing where nothing differs. `share` shrinks the ranges (`Models.draw`).
         """
         if self._models is not None:
-            self._models.draw(ids, rng)
+            self._models.draw(ids, rng, share)
 
     def reseed(self, seed: int) -> None:
         """Begins the errors of sensors and link anew with this seed, from the next `place` on."""
