@@ -123,7 +123,7 @@ def test_the_factor_is_on_the_penalties_and_on_nothing_else():
 
     whole, quarter = terms(1.0), terms(0.25)
     gains = {
-        *("forward_velocity", "speed_tracking", "lateral_tracking"),
+        *("forward_velocity", "speed_tracking", "lateral_tracking", "height_tracking"),
         *("stance_feet", "stance_pattern"),
     }
     for name, values in whole.items():

@@ -33,7 +33,7 @@ CONFIG = replace(
     RewardConfig.paper(),
     speed_tracking=2.0,
     lateral_tracking=4.0,
-    body_height=-100.0,
+    height_tracking=6.0,
     stance_feet=5.0,
     stance_pattern=3.0,
     slip=-0.5,
@@ -147,8 +147,8 @@ HAND_TABLE = {
     "speed_tracking": (0.03663127777746836, 2.2507034943851823e-07, 1.0545848480860982),
     # 4 exp(-(0.1 / 0.25)²) = 4 exp(-0.16); 4 exp(-1.44); 4 exp(-0.64)
     "lateral_tracking": (3.4085751559648453, 0.9477110735281574, 2.1091696961721964),
-    # -100 times 0.1² and 0.2²
-    "body_height": (-1.0, -4.0, 0.0),
+    # 6 exp(-(0.1 / 0.05)²) = 6 exp(-4); 6 exp(-16); 6
+    "height_tracking": (0.10989383333240508, 6.752110483155547e-07, 6.0),
     # 5 times the share of four, three and two feet; half and a quarter of that come late
     "stance_feet": (5.0, 1.875, 0.625),
     # 3 where all four agree

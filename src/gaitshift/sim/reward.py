@@ -17,10 +17,13 @@ BONUS_MODES: tuple[BonusMode, ...] = ("add", "multiply_clipped", "multiply")
 TRACKING_WIDTH = 0.25
 """Width of `speed_tracking` [m/s]; ours: about the swing of v_x within a stride."""
 
+HEIGHT_WIDTH = 0.05
+"""Width of `height_tracking` [m]; ours: beyond it a step of the ground is no reason to fall."""
+
 ADDITIONS = (
     "speed_tracking",
     "lateral_tracking",
-    "body_height",
+    "height_tracking",
     "stance_feet",
     "stance_pattern",
     "slip",
@@ -61,9 +64,9 @@ class RewardConfig:
     lateral_tracking: float = 10.0
     """Times exp(-((commanded v_y - v_y) / 0.25 m/s)²), in gaits for which a lateral speed may be
     commanded; ours: the term of Table I alone is too small to be worth a step aside."""
-    body_height: float = -4000.0
-    """Times (height of the base over the lowest foot - commanded height)² [1/m²], in gaits for
-    which a height may be commanded; ours."""
+    height_tracking: float = 8.0
+    """Times exp(-((commanded height - height) / 0.05 m)²), the height of the base over the lowest
+    foot, in gaits for which a height may be commanded; ours."""
     stance_feet: float = 12.0
     """Times the share of the feet whose contact agrees with the stance of the present state, and
     its punctuality; ours: the bonus rewards only the instant of a change, this term each foot at
@@ -113,7 +116,7 @@ def walk_reward(
     *,
     stance: Float[np.ndarray, " 12"],
     steps_aside: bool = False,
-    height_error: Float[np.ndarray, " N"] | float = 0.0,
+    height_error: Float[np.ndarray, " N"] | None = None,
     agreement: Float[np.ndarray, " N"],
     in_time: Float[np.ndarray, " N"] | float = 1.0,
     chatter: Float[np.ndarray, " N"],
@@ -129,7 +132,8 @@ def walk_reward(
         command: the command during the step.
         stance: q_init [rad].
         steps_aside: whether a lateral speed may be commanded.
-        height_error: height of the base minus the commanded height [m]; 0 where none is commanded.
+        height_error: height of the base minus the commanded height [m]; None where none may be
+            commanded.
         agreement: share of the feet whose contact agrees with the stance of the machine's state.
         in_time: punctuality of the stance, times the present strictness, in [0, 1].
         chatter: number of feet that came down out of place, times the present strictness.
@@ -157,7 +161,9 @@ def walk_reward(
         "lateral_tracking": config.lateral_tracking
         * steps_aside
         * np.exp(-side_error_squared / TRACKING_WIDTH**2),
-        "body_height": config.body_height * np.square(height_error) + np.zeros(len(velocity)),
+        "height_tracking": np.zeros(len(velocity))
+        if height_error is None
+        else config.height_tracking * np.exp(-np.square(height_error / HEIGHT_WIDTH)),
         "stance_feet": config.stance_feet * in_time * agreement,
         "stance_pattern": config.stance_pattern * in_time * (agreement == 1.0),
         "slip": config.slip * (foot_speed_squared * sensed.contact).sum(axis=1),

@@ -270,10 +270,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _height_error(
         self, ideal: Proprioception, command: Command
-    ) -> Float[np.ndarray, " N"] | float:
+    ) -> Float[np.ndarray, " N"] | None:
         """Height of the base minus the commanded height [m], where the gait takes a command."""
         if not self.machine.has_height:
-            return 0.0
+            return None
         return ideal.base_height - (self.robot.stance_height + command.body_height)
 
     def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
