@@ -311,6 +311,35 @@ def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_
     assert not wrong
 
 
+@pytest.mark.slow
+@browsing.needed
+def test_buttons_and_keys_drive_the_robot(served, browser, tmp_path):
+    """A click or a key moves the sliders by a step, and what they say stands in the log."""
+    _, address = served("--track", "flat@200")
+    page, wrong = opened(browser, address)
+    for name in ("faster", "left", "turn right", "higher"):
+        page.get_by_role("button", name=name, exact=True).click()
+    wait_until(lambda: float(number_box(page, "height from stance [m]").input_value()) > -0.03)
+    assert not page.get_by_label("the gait's own speed and stride").is_checked()
+    assert float(number_box(page, "speed [m/s]").input_value()) == pytest.approx(1.3)
+    page.get_by_text("real time").first.click()  # no field of the page takes the keys
+    for key in ("ArrowDown", "ArrowLeft", "ArrowLeft", "q"):
+        page.keyboard.press(key)
+    wait_until(lambda: float(number_box(page, "to the left [m/s]").input_value()) == 0.2)
+    begin_recording(page)
+    log = end_recording(page, tmp_path / "recorded")
+    asked = log[-1].sensed
+    assert asked.forward_speed_command[0] == pytest.approx(1.2, abs=1e-6)
+    assert asked.lateral_speed_command[0] == pytest.approx(0.2, abs=1e-6)
+    assert asked.body_height_command[0] == pytest.approx(-0.02, abs=1e-6)
+    turned = np.unwrap(log.truth.yaw[:, 0])
+    assert turned[-1] - turned[0] == pytest.approx(0.1 * np.ptp(log.time), abs=0.15)
+    page.get_by_text("real time").first.click()
+    page.keyboard.press("Space")
+    wait_until(lambda: float(number_box(page, "speed [m/s]").input_value()) == 0.0)
+    assert not wrong
+
+
 def times_real_time(page):
     """How fast the robot's clock goes, measured over four seconds."""
     robots, ours = status(page)[2], time.monotonic()
