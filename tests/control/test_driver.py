@@ -274,3 +274,25 @@ def test_policies_for_different_gains_cannot_be_shifted_between(policies, tmp_pa
     line = str(caught.value)
     assert "got anymal_b with gains 'paper' for bound" in line
     assert "anymal_b with gains 'default' for trot" in line
+
+
+def test_a_policy_is_not_shown_a_command_that_it_was_not_trained_for(tmp_path):
+    """A trot without lateral speed and height, one with both, and one that stands."""
+    ranged = replace(
+        gaits.load("trot"), name="aside", lateral_speed=0.3, height_range=(-0.1, 0.02)
+    )
+    machines = (gaits.load("trot"), ranged, gaits.load("stand"))
+    command = Command(
+        forward_speed=np.array([1.2, 0.0]),
+        yaw_rate=np.array([0.2, 0.4]),
+        stride_frequency=np.array([2.5, 2.5]),
+        lateral_speed=np.array([0.2, -0.5]),
+        body_height=np.array([-0.05, 0.1]),
+    )
+    plain, aside, stand = (exported(tmp_path, machine).within(command) for machine in machines)
+    assert (plain.lateral_speed.tolist(), plain.body_height.tolist()) == ([0, 0], [0, 0])
+    assert plain.forward_speed.tolist() == [1.2, 0.0]
+    assert aside.lateral_speed.tolist() == [0.2, -0.3]
+    assert aside.body_height.tolist() == [-0.05, 0.02]
+    assert (stand.forward_speed.tolist(), stand.yaw_rate.tolist()) == ([0, 0], [0, 0])
+    assert stand.body_height.tolist() == [-0.05, 0.02]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gaitshift.robot.command import CONTROL_PERIOD, HeadingLoop, SpeedLoop
+from gaitshift.robot.command import CONTROL_PERIOD, Command, HeadingLoop, SpeedLoop
 
 WANTED = 1.2
 
@@ -64,3 +64,42 @@ def test_a_robot_left_of_its_line_turns_right_and_not_too_fast():
     rate = loop.yaw_rate(zero, zero, np.array([0.1, -0.1, 100.0]))
     assert rate[0] < 0 < rate[1]
     assert rate[2] == -loop.yaw_rate_limit
+
+
+def test_a_robot_that_turns_as_commanded_gets_the_commanded_rate_and_no_more():
+    """Its yaw follows the heading exactly: after 4 s at 0.5 rad/s it has turned by 2 rad."""
+    loop, yaw, heading = HeadingLoop(), np.array([3.0]), np.array([3.0])
+    for _ in range(400):
+        heading, rate = loop.turning(yaw, heading, 0.5)
+        yaw = yaw + 0.5 * CONTROL_PERIOD  # beyond π: angles wrap
+        assert rate == pytest.approx([0.5], abs=0.01)
+    assert np.exp(1j * heading) == pytest.approx(np.exp(1j * np.array([5.0])))
+
+
+def test_a_robot_that_cannot_turn_is_not_turned_later():
+    """It is held for 10 s; let go, and commanded straight on, it turns by the limit at most."""
+    loop, held, heading = HeadingLoop(), np.array([0.1]), np.array([0.1])
+    for _ in range(1000):
+        heading, rate = loop.turning(held, heading, 0.4)
+    assert heading == pytest.approx([0.1 + loop.heading_limit])
+    assert rate == pytest.approx([loop.yaw_rate_limit])
+    again, rate = loop.turning(held, heading, 0.0)
+    assert again == heading
+    assert rate == loop.yaw_rate(held, heading)
+
+
+def test_parts_of_a_command_that_are_not_given_are_0_and_all_are_sensed():
+    command = Command(
+        forward_speed=np.array([1.0, 0.5]),
+        yaw_rate=np.array([0.1, 0.2]),
+        stride_frequency=np.array([2.0, 2.5]),
+        body_height=np.array([-0.1, 0.05]),
+    )
+    second = command.of(np.array([1])).sensed()
+    assert {name: value.item() for name, value in second.items()} == {
+        "forward_speed_command": 0.5,
+        "yaw_rate_command": 0.2,
+        "stride_frequency_command": 2.5,
+        "lateral_speed_command": 0.0,
+        "body_height_command": 0.05,
+    }

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gaitshift.learn.recipe import POLISH, ROUGH, PpoConfig, Recipe, Stage
+from gaitshift.learn.recipe import POLISH, ROUGH, PpoConfig, Recipe, Stage, shared_out
 from gaitshift.sim.env import EnvConfig
 from gaitshift.sim.sensor_config import ANYMAL
 from gaitshift.sim.world import Randomisation
@@ -34,7 +34,9 @@ def two_stage() -> Recipe:
 def deployable() -> Recipe:
     """For a robot that exists: sensors like ANYmal's with delay, estimated velocity, many bodies.
 
-    Ranges are those in which the shipped policies shall walk, and somewhat more of friction.
+    Ranges are those in which the shipped policies shall walk, and somewhat more of friction. The
+    rough ground is milder than that of `three_stage`: robots that also learn high edges while they
+    differ walk with twice the cost of transport, and their feet bounce.
     """
     bodies = Randomisation(
         friction=(0.25, 1.25),
@@ -47,7 +49,24 @@ def deployable() -> Recipe:
         softness=(1.0, 3.0),
     )
     link = replace(ANYMAL, name="deployable", delay=(0.0, 0.03))
-    return replace(three_stage(), env=EnvConfig(sensors=link, randomisation=bodies))
+    rough = replace(
+        POLISH,
+        name="rough",
+        iterations=500,
+        amplitude=0.14,
+        stair=0.05,
+        step=0.10,
+        fields=shared_out(flat=4, perlin=4, slope=2, stair=1, step=1),
+        swing_factor=1.2,
+        kl_factor=2.0,
+        settle=0.5,
+        averaged=0.3,
+    )
+    return Recipe(
+        env=EnvConfig(sensors=link, randomisation=bodies),
+        ppo=_EACH_MINI_BATCH,
+        stages=(Stage(name="flat", iterations=450), rough),
+    )
 
 
 def paper() -> Recipe:

@@ -74,7 +74,8 @@ FIELD_KINDS = ("flat", "perlin", "slope", "stair", "step")
 """Kinds of fields that a rough stage may have."""
 
 
-def _shared_out(**fields: int) -> tuple[str, ...]:
+def shared_out(**fields: int) -> tuple[str, ...]:
+    """Kinds of fields by their numbers."""
     return tuple(kind for kind, count in fields.items() for _ in range(count))
 
 
@@ -115,7 +116,7 @@ class Stage:
     """Factor on 1 / (1 - λ) steps, the time over which PPO assigns credit to an action; ours: with
     λ = 0.98 robots stay up on edges on which they fall with 0.95, but their steps are less clean;
     a last stage with 0.95 makes the steps clean again."""
-    fields: tuple[str, ...] = _shared_out(flat=3, perlin=2, slope=1, stair=3, step=3)
+    fields: tuple[str, ...] = shared_out(flat=3, perlin=2, slope=1, stair=3, step=3)
     """Kinds of the fields among which the robots are divided on rough ground; ours: without level
     ground among them the policy forgets the speeds and touchdowns that it learned there. With one
     field of stairs and one of steps in nine, 8 of 64 bounding robots stayed up over steps of 10 cm;
@@ -180,7 +181,7 @@ POLISH = replace(
     name="polish",
     iterations=300,
     trace_factor=1.0,
-    fields=_shared_out(flat=5, perlin=2, slope=1, stair=2, step=2),
+    fields=shared_out(flat=5, perlin=2, slope=1, stair=2, step=2),
     settle=1.0,
     averaged=0.5,
     kl_factor=0.7,

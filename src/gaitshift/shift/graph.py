@@ -94,7 +94,9 @@ class GaitGraph:
     edges: tuple[Edge, ...]
     """The edges."""
     reset: bool = True
-    """Whether a shift sets the robot's counters to 0 and resets its statistics."""
+    """Whether a shift sets the robot's counters to 0."""
+    forget: bool = True
+    """Whether statistics begin anew as well; else what they know of the ground stays."""
 
     def __post_init__(self) -> None:
         if not self.edges:
@@ -184,7 +186,7 @@ class GaitGraph:
             free &= ~takes
             # Edges of the new gait start at 0 or, as the paper has one k, continue from it.
             k[takes] = 0.0 if self.reset else k[takes, index, None]
-        if self.reset:
+        if self.reset and self.forget:
             for name, one in self.statistics.items():
                 memory[name] = begun_anew(one, memory[name], decision.fired)
         time = np.where(decision.fired, 0.0, time)

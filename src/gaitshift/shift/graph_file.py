@@ -41,7 +41,7 @@ def load_graph(name_or_path: str | Path = DEFAULT) -> GaitGraph:
 
 
 def _graph(data: dict[str, object]) -> GaitGraph:
-    table = Table(data, keys=("start", "reset", "statistic", "edge"))
+    table = Table(data, keys=("start", "reset", "forget", "statistic", "edge"))
     watched: dict[str, Watched] = {}
     for name, described in table.table("statistic").items():
         with located(f"statistic {name}"):
@@ -55,6 +55,7 @@ def _graph(data: dict[str, object]) -> GaitGraph:
         statistics=watched,
         edges=tuple(edges),
         reset=table.flag("reset", default=True),
+        forget=table.flag("forget", default=True),
     )
 
 

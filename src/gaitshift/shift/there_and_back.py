@@ -21,6 +21,7 @@ def there_and_back(
     flat: str = "trot",
     rough: str = "bound",
     reset: bool = True,
+    forget: bool = True,
     modulation: Modulation | None = None,
 ) -> GaitGraph:
     """Algorithm 1 (III-E) from the gait `flat` to the gait `rough`, and its reverse (IV-C).
@@ -33,7 +34,8 @@ def there_and_back(
             best statistic for the start of rough ground need not be the best for its end.
         flat: the gait for flat ground, and at the start.
         rough: the gait for rough ground.
-        reset: whether a shift resets the robot's counters and statistics.
+        reset: whether a shift resets the robot's counters.
+        forget: whether it resets the statistics as well.
         modulation: how α and α' depend on time or speed.
 
     Raises:
@@ -54,6 +56,7 @@ def there_and_back(
             for source, target, name, rule in ends
         ),
         reset=reset,
+        forget=forget,
     )
 
 
@@ -86,6 +89,7 @@ def between(graph: GaitGraph, *, flat: str, rough: str) -> GaitGraph:
         flat=flat,
         rough=rough,
         reset=graph.reset,
+        forget=graph.forget,
         modulation=there.modulation,
     )
 
