@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gaitshift.control.observation import FULL_SLICES
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.sim.env import EnvConfig, GaitEnv
@@ -63,7 +64,8 @@ def hop(n=3, *, ground=FLAT, threads=1, **config):
 
 
 def ranged(n, **config):
-    return GaitEnv(RANGED, FLAT, n, config=EnvConfig(**config), threads=1)
+    config = EnvConfig(observed=FULL_SLICES, **config)
+    return GaitEnv(RANGED, FLAT, n, config=config, threads=1)
 
 
 def arbitrary_actions(seed, steps, n, size=1.0):

@@ -278,9 +278,7 @@ def test_policies_for_different_gains_cannot_be_shifted_between(policies, tmp_pa
 
 def test_a_policy_is_not_shown_a_command_that_it_was_not_trained_for(tmp_path):
     """A trot without lateral speed and height, one with both, and one that stands."""
-    ranged = replace(
-        gaits.load("trot"), name="aside", lateral_speed=0.3, height_range=(-0.1, 0.02)
-    )
+    ranged = replace(gaits.load("trot"), name="aside", lateral_speed=0.3, height_range=(-0.1, 0.02))
     machines = (gaits.load("trot"), ranged, gaits.load("stand"))
     command = Command(
         forward_speed=np.array([1.2, 0.0]),

@@ -8,6 +8,7 @@ import pytest
 
 from gaitshift.control.observation import (
     DEFAULT_SLICES,
+    FULL_SLICES,
     JOINT_MIRROR,
     PAPER_SLICES,
     GaitState,
@@ -152,13 +153,13 @@ HAND_TABLE = {
 
 @pytest.mark.parametrize("name", HAND_TABLE)
 def test_each_slice_equals_the_hand_table(name):
-    observe = Observation(TROT, tuple(STANCE))
+    observe = Observation(TROT, tuple(STANCE), FULL_SLICES)
     seen = observe(*two_robots())[:, observe.slices[name]]
     np.testing.assert_allclose(seen, HAND_TABLE[name], rtol=1e-6, atol=1e-7)
 
 
 def test_slices_stand_one_after_another_in_the_papers_order():
-    observe = Observation(TROT, tuple(STANCE))
+    observe = Observation(TROT, tuple(STANCE), FULL_SLICES)
     assert list(observe.slices) == list(SIZES)
     edges = np.cumsum([0, *SIZES.values()]).tolist()
     assert [(s.start, s.stop) for s in observe.slices.values()] == list(pairwise(edges))
@@ -167,7 +168,8 @@ def test_slices_stand_one_after_another_in_the_papers_order():
 
 def test_the_papers_slices_are_its_nine_and_end_before_the_command():
     assert list(PAPER_SLICES) == list(SIZES)[:9]
-    assert list(DEFAULT_SLICES) == list(SIZES)
+    assert list(DEFAULT_SLICES) == list(SIZES)[:-2]
+    assert list(FULL_SLICES) == list(SIZES)
 
 
 def test_an_observation_of_other_slices_shows_them_in_the_order_asked_for():
@@ -268,7 +270,8 @@ def mirrored(sensed):
     ("gait", "images"), [("trot", [1, 0]), ("pace", [1, 0]), ("bound", [0, 1])]
 )
 def test_the_mirrored_observation_is_the_observation_of_the_mirrored_motion(gait, images):
-    observe, (state, sensed, command) = Observation(gaits.load(gait), LEVEL_STANCE), two_robots()
+    observe = Observation(gaits.load(gait), LEVEL_STANCE, FULL_SLICES)
+    state, sensed, command = two_robots()
     abduction = np.array([-1.0, 1.0, 1.0] * 4)
     reflected = observe(
         GaitState(
@@ -287,7 +290,7 @@ def test_the_mirrored_observation_is_the_observation_of_the_mirrored_motion(gait
 
 
 @pytest.mark.parametrize("gait", gaits.names())
-@pytest.mark.parametrize("names", [DEFAULT_SLICES, PAPER_SLICES, DEFAULT_SLICES[::-1]])
+@pytest.mark.parametrize("names", [FULL_SLICES, PAPER_SLICES, DEFAULT_SLICES[::-1]])
 def test_two_mirrors_show_the_observation_itself(gait, names):
     observe = Observation(gaits.load(gait), LEVEL_STANCE, names)
     order, signs = observe.mirror

@@ -127,7 +127,9 @@ def test_the_exported_critic_is_the_trained_one_but_for_half_precision(tmp_path,
         loaded.value(observation), trained, atol=3e-3 * np.abs(trained).max()
     )
     assert np.ptp(trained) > 0.1, "the values differ"
-    np.testing.assert_allclose(loaded(observation), acted, rtol=1e-5, atol=1e-7 * np.abs(acted).max())
+    np.testing.assert_allclose(
+        loaded(observation), acted, rtol=1e-5, atol=1e-7 * np.abs(acted).max()
+    )
 
 
 def test_a_policy_without_a_critic_says_so(made):

@@ -19,7 +19,7 @@ from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.learn.run import Run
 from gaitshift.sim.env import Curriculum, EnvConfig
 from gaitshift.sim.push import PushConfig
-from gaitshift.sim.reward import BONUS_SHARES, RewardConfig
+from gaitshift.sim.reward import SHARES, RewardConfig
 from training import TINY, TROT, KilledError, create, kill_at, rows, same_bits, weights
 
 
@@ -40,7 +40,7 @@ def test_progress_has_a_column_for_every_figure_and_every_term_of_the_reward(who
     figures |= {"stance_fraction", "survival", "value_loss", "action_std", "learning_rate"}
     figures |= {"diverged"}
     weights = {field.name for field in fields(RewardConfig)}
-    terms = weights - {"bonus_mode", *BONUS_SHARES}
+    terms = weights - {"bonus_mode", *SHARES}
     assert set(reported[0]) == figures | {f"reward/{name}" for name in terms}
     for row in reported:
         assert all(np.isfinite(value) for name, value in row.items() if name != "stage")

@@ -7,6 +7,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 
 from gaitshift.errors import GaitshiftError
 from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.reward import RewardConfig
 from hopping import (
     DWELL,
     EDGES,
@@ -55,7 +56,8 @@ def test_gymnasiums_own_episode_counter_counts_the_same_episodes():
 
 
 def test_machines_in_the_environment_step_as_a_loop_over_robots_and_feet_does(monkeypatch):
-    env = hop(3, episode_steps=70, heading_range=0.0)
+    reward = RewardConfig(stance_punctuality=1.0)
+    env = hop(3, episode_steps=70, heading_range=0.0, reward=reward)
     env.reset(seed=1)
     steps = keep_steps(env, monkeypatch)
     states, deltas, changes, falls = [0] * 3, [0] * 3, 0, 0

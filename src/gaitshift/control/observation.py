@@ -141,9 +141,10 @@ DEFAULT_SLICES = (
     "wait",
     "last_action",
     "touch_height",
-    "lateral_speed_command",
-    "body_height_command",
 )
+
+FULL_SLICES = (*DEFAULT_SLICES, "lateral_speed_command", "body_height_command")
+"""All parts of the command as well, for gaits that take them."""
 
 
 def check_slices(names: tuple[str, ...]) -> None:

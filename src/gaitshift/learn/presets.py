@@ -2,8 +2,10 @@
 
 from dataclasses import replace
 
+from gaitshift.control.observation import FULL_SLICES
 from gaitshift.learn.recipe import POLISH, ROUGH, PpoConfig, Recipe, Stage, shared_out
 from gaitshift.sim.env import EnvConfig
+from gaitshift.sim.reward import RewardConfig
 from gaitshift.sim.sensor_config import ANYMAL
 from gaitshift.sim.world import Randomisation
 
@@ -63,7 +65,12 @@ def deployable() -> Recipe:
         averaged=0.3,
     )
     return Recipe(
-        env=EnvConfig(sensors=link, randomisation=bodies),
+        env=EnvConfig(
+            reward=RewardConfig(stance_punctuality=1.0),
+            observed=FULL_SLICES,
+            sensors=link,
+            randomisation=bodies,
+        ),
         ppo=_EACH_MINI_BATCH,
         stages=(Stage(name="flat", iterations=450), rough),
     )

@@ -33,8 +33,8 @@ ADDITIONS = (
 )
 """The terms that are ours; all others are those of Table I."""
 
-BONUS_SHARES = ("bonus_swing", "bonus_punctuality")
-"""Settings by which the bonus depends on swing height and punctuality; ours."""
+SHARES = ("stance_punctuality", "bonus_swing", "bonus_punctuality")
+"""Settings by which stances and bonus depend on swing height and punctuality; ours."""
 
 RewardTerms = dict[str, Float[np.ndarray, " N"]]
 """The weighted terms of R_walk by name, each (N,)."""
@@ -68,12 +68,13 @@ class RewardConfig:
     """Times exp(-((commanded height - height) / 0.05 m)²), the height of the base over the lowest
     foot, in gaits for which a height may be commanded; ours."""
     stance_feet: float = 12.0
-    """Times the share of the feet whose contact agrees with the stance of the present state, and
-    its punctuality; ours: the bonus rewards only the instant of a change, this term each foot at
-    every step. A stance that is held for too long earns nothing: a slow walk would stand."""
+    """Times the share of the feet whose contact agrees with the stance of the present state; ours:
+    the bonus rewards only the instant of a change, this term each foot at every step."""
     stance_pattern: float = 12.0
-    """Times the punctuality where that share is 1; ours: without it three correct feet out of four
-    are good enough."""
+    """Where that share is 1; ours: without it three correct feet out of four are good enough."""
+    stance_punctuality: float = 0.0
+    """Share of these two terms that depends on punctuality, times the environment's strictness;
+    ours: at 1 a stance that is held for too long earns nothing, where a slow walk would stand."""
     slip: float = -0.5
     """Times Σ v_xy² of the feet in contact [s²/m²]; ours: feet that stand should stand still."""
     power: float = -0.0225
@@ -105,7 +106,7 @@ class RewardConfig:
     @classmethod
     def paper(cls, bonus_mode: BonusMode = "add") -> "RewardConfig":
         """Table I and b = 200 alone."""
-        return cls(**dict.fromkeys((*ADDITIONS, *BONUS_SHARES), 0.0), bonus_mode=bonus_mode)
+        return cls(**dict.fromkeys((*ADDITIONS, *SHARES), 0.0), bonus_mode=bonus_mode)
 
 
 def walk_reward(
@@ -135,7 +136,7 @@ def walk_reward(
         height_error: height of the base minus the commanded height [m]; None where none may be
             commanded.
         agreement: share of the feet whose contact agrees with the stance of the machine's state.
-        in_time: punctuality of the stance, times the present strictness, in [0, 1].
+        in_time: factor on the terms of the stance, below 1 where it is held for too long.
         chatter: number of feet that came down out of place, times the present strictness.
         action_change: action minus the action before it.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).

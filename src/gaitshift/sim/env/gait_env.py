@@ -124,7 +124,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             steps_aside=self.machine.lateral_speed > 0,
             height_error=self._height_error(ideal, command),
             agreement=agreement,
-            in_time=1.0 - asked.strictness * (1.0 - self._punctuality(command)),
+            in_time=self._in_time(command),
             chatter=asked.strictness * chatter,
             action_change=action - before.last_action,
             penalty_scale=asked.penalty_scale,
@@ -262,11 +262,15 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         )
         self._state = self._state.with_robots(ids, going)
 
-    def _punctuality(self, command: Command) -> Float[np.ndarray, " N"]:
-        """Of a change in the next step: below 1 where a stance has been held for too long."""
+    def _in_time(self, command: Command) -> Float[np.ndarray, " N"] | float:
+        """Factor on the stance terms, below 1 where a stance has been held for too long."""
+        share = self.curriculum.strictness * self.config.reward.stance_punctuality
+        if share == 0:
+            return 1.0
         machine, state = self.machine, self._state
         dwell = machine.dwell_for(command.stride)
-        return machine.punctuality(state.machine_state, state.steps_in_state, dwell)
+        punctuality = machine.punctuality(state.machine_state, state.steps_in_state, dwell)
+        return 1.0 - share * (1.0 - punctuality)
 
     def _height_error(
         self, ideal: Proprioception, command: Command
