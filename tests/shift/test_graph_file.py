@@ -144,7 +144,7 @@ def test_shipped_graphs_load_and_are_drawn_edge_by_edge(name):
 
 
 def test_an_unknown_graph_is_refused_with_those_there_are():
-    known = "height_difference, oracle, oscillators, paper, speed, terrain"
+    known = "height_difference, oracle, oscillators, paper, sensors, speed, terrain"
     with pytest.raises(GaitshiftError, match=f"did you mean 'terrain'.*known graphs: {known}"):
         load_graph("terran")
     with pytest.raises(GaitshiftError, match="did you mean 'paper'"):

@@ -177,9 +177,11 @@ def test_height_that_is_not_a_number_counts_for_neither_rule_until_the_foot_touc
     assert counted == ([0, 1] if rough else [0, 3])
 
 
-@pytest.mark.parametrize("reset", [True, False])
-def test_firing_restarts_count_and_heights_or_neither(reset):
-    graph = replace(tuned(PAPER, beta=6.0, beta_back=2.0), reset=reset)
+@pytest.mark.parametrize(
+    ("reset", "forget"), [(True, True), (True, False), (False, True), (False, False)]
+)
+def test_firing_restarts_count_and_heights_or_the_count_or_neither(reset, forget):
+    graph = replace(tuned(PAPER, beta=6.0, beta_back=2.0), reset=reset, forget=forget)
     uneven, level = np.array([0.0, 0.3, 0.6, 0.9]), np.zeros(4)
     state, history = graph.begin(1), []
     for heights in [uneven] * 3 + [level] * 3 + [uneven] * 2:
@@ -198,7 +200,12 @@ def test_firing_restarts_count_and_heights_or_neither(reset):
         (12.0, True, 0.0), (13.0, True, 0.0), (13.0, True, 0.0),
         (13.0, True, 0.9), (19.0, True, 0.9),
     ]  # fmt: skip
-    assert history == (anew if reset else on)
+    kept = [
+        (6.0, False, 0.9), (0.0, True, 0.9), (0.0, False, 0.9),
+        (1.0, False, 0.0), (2.0, False, 0.0), (0.0, True, 0.0),
+        (6.0, False, 0.9), (0.0, True, 0.9),
+    ]  # fmt: skip
+    assert history == ((anew if forget else kept) if reset else on)
 
 
 def test_without_reset_k_goes_on_from_where_it_fired():
