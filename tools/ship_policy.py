@@ -1,18 +1,22 @@
 """Ships a trained policy: the network, its curve and its figures go into the package.
 
 Usage: python tools/ship_policy.py [--trials all|short|quick] RUN|GAIT...
+       python tools/ship_policy.py --deployable RUN...
 
 A gait by its name is one that is shipped already: its figures are made anew. `make policies` trains
-and ships all.
+and ships all. With --deployable a policy for real sensors goes into policies/deployable;
+`tools/deployable_evidence.py` makes its figures.
 """
 
 import argparse
 import json
+import shlex
 import shutil
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import onnx
 from gait_results import PAGE, page
 
 from gaitshift import table
@@ -40,6 +44,23 @@ def ship(run: Path, trials: str) -> None:
     )
     CURVES.mkdir(parents=True, exist_ok=True)
     training_curves(run / "progress.csv", CURVES / f"{name}.png")
+
+
+def ship_deployable(run: Path) -> None:
+    """Copies the policy of `run` and its record, which names no folder of this machine."""
+    folder = POLICIES / "deployable"
+    loaded = policy.load(run / "policy.onnx")
+    words = shlex.split(loaded.info.training["command"])
+    at = words.index("--out") if "--out" in words else len(words)
+    training = {**loaded.info.training, "command": shlex.join(words[:at] + words[at + 2 :])}
+    model = onnx.load(run / "policy.onnx")
+    for entry in model.metadata_props:
+        if entry.key == "gaitshift.training":
+            entry.value = json.dumps(training)
+    folder.mkdir(exist_ok=True)
+    onnx.save(model, folder / f"{loaded.gait}.onnx")
+    text = json.dumps({**training, "preset": "deployable"}, indent=1) + "\n"
+    (folder / f"{loaded.gait}.json").write_text(text, encoding="utf-8")
 
 
 def judge_again(name: str, trials: str) -> None:
@@ -80,11 +101,15 @@ def _rounded(value: object) -> object:
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--trials", choices=tuple(SIZES), default="all")
+    parser.add_argument("--deployable", action="store_true")
     parser.add_argument("runs", nargs="+", metavar="RUN|GAIT")
     options = parser.parse_args()
     for run in options.runs:
-        if run in policy.shipped():
+        if options.deployable:
+            ship_deployable(Path(run))
+        elif run in policy.shipped():
             judge_again(run, options.trials)
         else:
             ship(Path(run), options.trials)
-    PAGE.write_text(page(), encoding="utf-8")
+    if not options.deployable:
+        PAGE.write_text(page(), encoding="utf-8")
