@@ -260,6 +260,18 @@ def test_a_shipped_policy_is_loaded_by_the_name_of_its_gait(name):
     assert policy.load(name).gait == name
 
 
+@pytest.mark.parametrize("name", policy.shipped("deployable"))
+def test_a_policy_for_real_sensors_names_the_command_that_trains_it(name):
+    loaded = policy.load(f"deployable/{name}")
+    assert loaded.gait == name
+    assert "base_linear_velocity_b" in loaded.info.observation, "by the estimator"
+    command = loaded.info.training["command"]
+    assert command.startswith(f"gaitshift train {name} --preset deployable --seed ")
+    assert "--out" not in command
+    record = json.loads(policy.record_file(f"deployable/{name}").read_text(encoding="utf-8"))
+    assert record["command"] == command
+
+
 # What is refused --------------------------------------------------------------------------------
 
 

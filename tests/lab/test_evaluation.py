@@ -27,6 +27,7 @@ from gaitshift.learn.learner import Learner
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.shift import load_graph
 from gaitshift.sim.env import GaitEnv
+from gaitshift.sim.sensor_config import sensor_preset
 from gaitshift.sim.terrain import flat, from_spec
 from gaitshift.sim.world import World
 
@@ -359,3 +360,18 @@ def test_a_graph_is_asked_for_without_numbers_of_a_condition():
     assert DemoConfig(graph="speed").used == ("walk", "trot", "bound")
     with pytest.raises(GaitshiftError, match="a graph of two gaits, there and back, is needed"):
         _ = DemoConfig(graph="speed", beta=3.0).ways
+
+
+@pytest.mark.slow
+def test_robots_with_real_sensors_shift_there_and_back():
+    """Policies and graph for them, on the demonstration's track, of which the noise is 8 to 20 m."""
+    config = DemoConfig(episodes=4, seed=5, graph="sensors", sensors=sensor_preset("anymal"))
+
+    def make(gaits, n, *, robot=None):
+        return Driver.load([f"deployable/{gait}" for gait in gaits], n, robot=robot)
+
+    _, summaries = run_demo(config, make=make)
+    assert all(summary["survived"] and summary["finished"] for summary in summaries)
+    shifts = [[(shift["to"], shift["x_m"]) for shift in one["switches"]] for one in summaries]
+    assert all(one[0][0] == "bound" and 8.0 < one[0][1] < 14.0 for one in shifts)
+    assert sum([to for to, _ in one] == ["bound", "trot"] for one in shifts) >= 3
