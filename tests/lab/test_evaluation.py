@@ -364,7 +364,7 @@ def test_a_graph_is_asked_for_without_numbers_of_a_condition():
 
 @pytest.mark.slow
 def test_robots_with_real_sensors_shift_there_and_back():
-    """Policies and graph for them, on the demonstration's track, of which the noise is 8 to 20 m."""
+    """Policies and graph for them, on the demonstration's track, with noise from 8 to 20 m."""
     config = DemoConfig(episodes=4, seed=5, graph="sensors", sensors=sensor_preset("anymal"))
 
     def make(gaits, n, *, robot=None):
