@@ -51,10 +51,10 @@ like ANYmal's, an estimated velocity, delay, and robots that differ. They lie in
 `src/gaitshift/control/policies/deployable`; `gaitshift evaluate deployable/trot --sensors anymal`
 runs one, and `--policy-files` takes the files in every command.
 
-**Hypothesis**, written before these runs and after looks at trot and bound on other seeds: every row
-below meets its goal, but for the touchdowns of the bound (1.2 a cycle) and the greatest speeds.
-**Seeds**: {seed} and above, which chose nothing. All robots have the preset
-`anymal`. An interval is the exact one of 95 % (Clopper and Pearson 1934).
+**Hypothesis**, written before these runs and after looks at trot and bound on other seeds: every
+row below meets its goal, but for the touchdowns of the bound (1.2 a cycle) and the greatest speeds.
+**Seeds**: {seed} and above, which chose nothing. All robots have the preset `anymal`. An interval
+is the exact one of 95 % (Clopper and Pearson 1934).
 
 ## Grounds
 

@@ -287,7 +287,7 @@ def test_a_trained_run_can_be_evaluated(capsys: pytest.CaptureFixture[str], tmp_
     assert {"config.json", "progress.csv", "checkpoints", "policy.onnx", "tensorboard"} <= names
     assert row["verdict"]["gait"] == "stand"
     assert row["verdict"]["clean"] is False
-    assert (out / "verdicts.csv").read_text().splitlines()[-1].startswith("2,none,False,")
+    assert (out / "verdicts.csv").read_text().splitlines()[-1].startswith("2,stand,False,")
     main(["train", "--resume", str(out), "--json"])
     assert json.loads(capsys.readouterr().out) == row, "a run that is over tells the same again"
     main(["evaluate", row["policy"], "--episodes", "2", "--seconds", "0.2", "--json"])

@@ -57,7 +57,7 @@ def test_a_run_ends_on_the_ground_and_with_the_pushes_of_its_last_stage(whole):
         np.testing.assert_array_equal(ground.height, expected.height)
     assert run.learner.env.config.push.force == 100.0
     assert run.learner.env.curriculum == Curriculum(
-        strictness=1.0, swing_factor=1.5, command_scale=1.0, mixed_starts=0.5
+        strictness=1.0, swing_factor=1.5, command_scale=1.0, randomisation=0.0, mixed_starts=0.5
     )
     settled = run.recipe.settling(run.recipe.iterations - 1)
     assert settled < 1.0
