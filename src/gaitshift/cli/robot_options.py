@@ -50,7 +50,8 @@ class RobotOptions(RobotOption):
     """For a command that runs policies by the names of their gaits."""
 
     policy_files: tuple[Path, ...] = ()
-    """Policy files ending in .onnx that take the place of the shipped policies of their gaits."""
+    """Policy files ending in .onnx that take the place of the shipped policies of their gaits, or
+    shipped ones for real sensors by name, such as deployable/trot."""
 
     def known_gaits(self) -> tuple[str, ...]:
         """Gaits with a policy: those of the files and, for ANYmal B, the shipped ones."""
