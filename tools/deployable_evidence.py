@@ -3,8 +3,8 @@
 Usage: python tools/deployable_evidence.py [--page] [PART...]
 
 Parts are grounds, clean, shifts, ranges, stand and bodies; all by default, which takes an hour on
-two idle cores. Each outcome is a row of deployable.csv, or of deployable_shifts.csv, beside the page,
-and rows that are there are not made again. `--page` runs nothing and writes the page from them.
+two idle cores. Each outcome is a row of deployable.csv, or of deployable_shifts.csv, beside the
+page, and rows that are there are not made again. `--page` runs nothing and writes the page from them.
 """
 
 import argparse
@@ -375,8 +375,8 @@ def _shifts() -> str:
     ways = [at[0] - NOISE_AT for at in places if at and at[0] >= NOISE_AT]
     homes = [float(row["at"].split()[1]) - NOISE_UNTIL for row in back]
     return (
-        f"{len(there)} robots cross the demonstration's track, each on a field of its own, with the "
-        f"graph `sensors`. {len(back)} of {len(there)} shift to the bound on the noise of 10 cm and "
+        f"{len(there)} robots cross the demonstration's track, each on a field of its own, with "
+        f"the graph `sensors`. {len(back)} of {len(there)} shift to the bound on the noise of 10 cm and "
         f"back behind it, without a fall and without another shift; {early} shift before the noise. "
         f"The noise is noticed after {np.mean(ways):.2f} m (the latest after {max(ways):.2f} m), its "
         f"end after {np.mean(homes):.2f} m."
