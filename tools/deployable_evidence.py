@@ -4,7 +4,7 @@ Usage: python tools/deployable_evidence.py [--page] [PART...]
 
 Parts are grounds, clean, shifts, ranges, stand and bodies; all by default, which takes an hour on
 two idle cores. Each outcome is a row of deployable.csv, or of deployable_shifts.csv, beside the
-page, and rows that are there are not made again. `--page` runs nothing and writes the page from them.
+page, and rows that are there are not made again. `--page` runs nothing and writes the page.
 """
 
 import argparse
@@ -376,10 +376,10 @@ def _shifts() -> str:
     homes = [float(row["at"].split()[1]) - NOISE_UNTIL for row in back]
     return (
         f"{len(there)} robots cross the demonstration's track, each on a field of its own, with "
-        f"the graph `sensors`. {len(back)} of {len(there)} shift to the bound on the noise of 10 cm and "
-        f"back behind it, without a fall and without another shift; {early} shift before the noise. "
-        f"The noise is noticed after {np.mean(ways):.2f} m (the latest after {max(ways):.2f} m), its "
-        f"end after {np.mean(homes):.2f} m."
+        f"the graph `sensors`. {len(back)} of {len(there)} shift to the bound on the noise of "
+        f"10 cm and back behind it, without a fall and without another shift; {early} shift "
+        f"before the noise. It is noticed after {np.mean(ways):.2f} m, the latest after "
+        f"{max(ways):.2f} m, and its end after {np.mean(homes):.2f} m."
     )
 
 
