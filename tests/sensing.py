@@ -42,15 +42,15 @@ def headed(sensed, yaw):
     return replace(sensed, orientation=orientation_of(sensed.gravity_b, yaw), has_heading=True)
 
 
-def random_sensed(rng, n, step, size=1.0):
-    """What robots sense, unlike for every robot, foot and step; `size` is how much bodies move."""
-    gravity = DOWN + 0.3 * size * rng.normal(size=(n, 3))
+def random_sensed(rng, n, step):
+    """What robots sense, unlike for every robot, foot and step."""
+    gravity = DOWN + 0.3 * rng.normal(size=(n, 3))
     gravity /= np.linalg.norm(gravity, axis=1, keepdims=True)
     # No two alike, and steady: nothing is known of a robot that is thrown off its heading.
     yaw = np.linspace(-2.0, 2.0, n) + 0.005 * rng.normal(size=n)
     return Proprioception(
         contact=rng.random((n, 4)) < 0.6,
-        foot_position_b=FEET + rng.normal(scale=0.1 * size, size=(n, 4, 3)),
+        foot_position_b=FEET + rng.normal(scale=0.1, size=(n, 4, 3)),
         orientation=orientation_of(gravity, yaw),
         joint_velocity=rng.normal(size=(n, 12)),
         joint_torque=rng.normal(scale=30.0, size=(n, 12)),

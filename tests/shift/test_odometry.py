@@ -22,7 +22,7 @@ def test_odometry_by_the_standing_feet_is_where_the_base_went():
 def test_a_foot_that_is_felt_in_its_swing_does_not_carry_the_base():
     """The other feet show 1 m/s; the swinging one is felt for 30 ms every 0.2 s."""
     for false in (False, True):
-        odometry = LegOdometry()
+        odometry = LegOdometry(agreement=1.0)
         state, first = odometry.start(1), None
         for step, (base, sensed) in enumerate(strolling(lambda x, y: 0.0, turn=0.0, wobble=0.0)):
             felt = sensed.contact | (np.arange(4) == (step // 20) % 4) * (
@@ -35,7 +35,7 @@ def test_a_foot_that_is_felt_in_its_swing_does_not_carry_the_base():
 
 def test_odometry_finds_back_to_feet_that_stand():
     """A robot that is carried away at 3 m/s, with one foot down, is followed after 0.3 s."""
-    odometry, one = LegOdometry(), np.array([[True, False, False, False]])
+    odometry, one = LegOdometry(agreement=1.0), np.array([[True, False, False, False]])
     state = odometry.start(1)
     for _ in range(20):
         state, _ = odometry.step(state, standing())

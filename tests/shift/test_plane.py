@@ -77,14 +77,26 @@ def test_a_slope_is_not_roughness_and_waves_are(statistic):
 def test_a_foot_that_bounces_has_touched_once():
     statistic = PlaneResidual(touches=2)
     state = statistic.start(1)
-    for contact in (
-        *[[1, 1, 1, 1]] * 3,
-        [0, 1, 1, 1],
-        [1, 1, 1, 1],
-        *[[0, 1, 1, 1]] * 6,
-        *[[1, 1, 1, 1]] * 3,
-    ):
+    for contact in ([1, 1, 1, 1], [0, 1, 1, 1], [1, 1, 1, 1], *[[0, 1, 1, 1]] * 6, [1, 1, 1, 1]):
         sensed = replace(standing(), contact=np.array([contact], dtype=bool))
         state, _ = statistic.step(state, sensed)
         counts = (~np.isnan(state.touch[0, :, :, 0])).sum(axis=1).tolist()
     assert counts == [2, 1, 1, 1]
+
+
+def test_a_foot_that_is_felt_in_its_swing_has_not_touched():
+    """Felt for 30 ms in a swing at 2 m/s, and then for 30 ms where it stands."""
+    for least, touches in ((0.0, 3), (0.02, 2)):
+        statistic = PlaneResidual(touches=3, least_stance=least)
+        state = statistic.start(1)
+        moves = [0.0] * 10 + [0.02] * 25 + [0.0] * 10
+        felt = [1] * 10 + [0] * 10 + [1] * 3 + [0] * 12 + [1] * 10
+        place = 0.0
+        for move, contact in zip(moves, felt, strict=True):
+            place += move
+            feet = FEET.copy()
+            feet[0, 0] += place
+            contacts = np.array([[contact, 1, 1, 1]], dtype=bool)
+            state, _ = statistic.step(state, standing(feet=feet, contact=contacts))
+        counts = (~np.isnan(state.touch[0, :, :, 0])).sum(axis=1).tolist()
+        assert counts == [touches, 1, 1, 1]

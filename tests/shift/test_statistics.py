@@ -33,9 +33,9 @@ def soon_known(kind):
 
 
 def random_walk(rng, n, steps):
-    """What robots sense, and what only an oracle knows, in each step; feet down stand still."""
+    """What robots sense, and what only an oracle knows, in each step."""
     for step in range(steps):
-        yield random_sensed(rng, n, step, size=0.01), rng.random(n) < 0.5
+        yield random_sensed(rng, n, step), rng.random(n) < 0.5
 
 
 def arrays_in(state):

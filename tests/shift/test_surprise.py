@@ -29,7 +29,7 @@ def test_who_sways_is_told_less_in_proportion():
     assert told(0.5 * STEADY) == pytest.approx(still, rel=1e-3), (
         "a robot that sways less than a steady walker keeps its full value"
     )
-    assert told(4.0 * STEADY) == pytest.approx(still / (4.0 / math.sqrt(2.0)), rel=0.05)
+    assert told(8.0 * STEADY) == pytest.approx(still / (8.0 / math.sqrt(2.0)), rel=0.05)
 
 
 @pytest.mark.parametrize("speed", [1.0, -1.0])

@@ -30,6 +30,9 @@ class PlaneResidual:
     """Number of touches of each foot in memory."""
     least_swing: float = 0.05
     """A foot that touches again sooner has bounced: it is the same touch [s]."""
+    least_stance: float = 0.0
+    """A foot that stands for less time has not touched [s]; above 0 false contacts are sorted out
+    (`Touches`)."""
 
     unit = "m"
     width = 1
@@ -41,7 +44,9 @@ class PlaneResidual:
 
     @cached_property
     def _memory(self) -> Touches:
-        return Touches(kept=self.touches, least_swing=self.least_swing)
+        return Touches(
+            kept=self.touches, least_swing=self.least_swing, least_stance=self.least_stance
+        )
 
     def start(self, n: int) -> TouchState:
         """State of n robots before any touch."""

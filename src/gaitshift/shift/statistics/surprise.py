@@ -91,6 +91,9 @@ class TouchdownSurprise:
     """Decay constant of the means [touchdowns on new ground]; 1: the last change alone."""
     least_swing: float = 0.05
     """A foot that touches again sooner has bounced: it is the same touch [s]."""
+    least_stance: float = 0.0
+    """A foot that stands for less time has not touched [s]; above 0 false contacts are sorted out
+    (`Touches`)."""
 
     unit = "m"
     width = 1
@@ -109,7 +112,9 @@ class TouchdownSurprise:
 
     @cached_property
     def _memory(self) -> Touches:
-        return Touches(kept=self.touches, least_swing=self.least_swing)
+        return Touches(
+            kept=self.touches, least_swing=self.least_swing, least_stance=self.least_stance
+        )
 
     def start(self, n: int) -> SurpriseState:
         """State of n robots before any touch."""

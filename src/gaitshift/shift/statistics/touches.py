@@ -11,6 +11,11 @@ from gaitshift.robot.state import GRAVITY, Proprioception
 from gaitshift.shift.statistics.contacts import ContactFilter, ContactState
 
 
+AGREEMENT = 1.0
+"""Velocities that differ by less agree [m/s]; ours: a swinging foot moves at twice the speed of the
+base."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OdometryState:
     """What odometry remembers. Its frame has z up; x and y as the robot's heading was given."""
@@ -33,20 +38,20 @@ class OdometryState:
 class LegOdometry:
     """Feet that touch in two steps running stand still: the base moves as they seem to move back.
 
-    A foot that is felt in its swing would carry the base along. So a foot stands only where the
-    base velocity that it shows is near the last one, or near that which another foot shows. With no
-    such foot the base flies on as it did, and falls. Errors add up with the distance: it is good
-    for the few strides that conditions look back on.
+    With no such foot the base flies on as it did, and falls. Errors add up with the distance: it is
+    good for the few strides that conditions look back on. A foot that is felt in its swing would
+    carry the base along. With a finite `agreement` a foot stands only where the base velocity that
+    it shows is near the last one, or near that which another foot shows.
     """
 
     smoothing: float = 0.03
     """The velocity forgets by e in this time [s]."""
-    agreement: float = 1.0
-    """Greatest difference of velocities that agree [m/s]; ours: a swinging foot moves at twice the
-    speed of the base."""
+    agreement: float = np.inf
+    """Greatest difference of velocities that agree [m/s]; infinity: every foot that is felt
+    stands."""
     longest_flight: float = 0.3
-    """After this time any foot that is felt stands [s]; ours: twice the longest flight of a shipped
-    gait."""
+    """With a finite agreement: after this time any foot that is felt stands [s]; ours: twice the
+    longest flight of a shipped gait."""
 
     def start(self, n: int) -> OdometryState:
         """State of n robots at the origin, in the air and at rest."""
@@ -72,7 +77,7 @@ class LegOdometry:
         fall = np.array([0.0, 0.0, GRAVITY * period])
         by_flight = (state.velocity - 0.5 * fall) * period
         move = np.where(count > 0, by_feet, by_flight)
-        lost = (state.flight > self.longest_flight)[:, None]
+        lost = self._lost(state)[:, None]
         share = np.where(lost, 1.0, min(1.0, period / self.smoothing))
         by_feet_velocity = state.velocity + share * (by_feet / period - state.velocity)
         velocity = np.where(count > 0, by_feet_velocity, state.velocity - fall)
@@ -92,6 +97,8 @@ class LegOdometry:
     ) -> Bool[np.ndarray, "N 4"]:
         """Feet that touch in two steps and show a base velocity that something else shows too."""
         touch = sensed.contact & state.contact
+        if self.agreement == np.inf:
+            return touch
         shown = (state.foot - foot) / sensed.period
         far = _square(shown - state.velocity[:, None]) > self.agreement**2
         if not (touch & far).any():
@@ -99,8 +106,13 @@ class LegOdometry:
         apart = _square(shown[:, :, None] - shown[:, None])
         agree = (apart < self.agreement**2) & touch[:, :, None] & touch[:, None]
         has_fellow = agree.sum(axis=-1) > 1
-        lost = state.flight > self.longest_flight
-        return touch & (~far | has_fellow | lost[:, None])
+        return touch & (~far | has_fellow | self._lost(state)[:, None])
+
+    def _lost(self, state: OdometryState) -> Bool[np.ndarray, " N"]:
+        """Robots of which no foot has agreed for so long that the velocity must be wrong."""
+        if self.agreement == np.inf:
+            return np.zeros(len(state.flight), dtype=bool)
+        return state.flight > self.longest_flight
 
 
 def _square(vector: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch"]:
@@ -154,9 +166,9 @@ class Touches:
     """Number of touches of each foot in memory."""
     least_swing: float
     """A foot that touches again sooner has bounced: it is the same touch [s]."""
-    least_stance: float = 0.02
-    """A foot that stands for less time, by the odometry, has not touched [s]; ours: false contacts
-    last some 20 ms."""
+    least_stance: float = 0.0
+    """A foot that stands for less time has not touched [s]. Above 0 odometry decides which feet
+    stand (`AGREEMENT`); at 0 every foot that is felt does, at once."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.kept <= 100:
@@ -167,10 +179,14 @@ class Touches:
     def _filter(self) -> ContactFilter:
         return ContactFilter(least_stance=self.least_stance, least_swing=self.least_swing)
 
+    @cached_property
+    def _odometry(self) -> LegOdometry:
+        return LegOdometry(agreement=AGREEMENT if self.least_stance > 0 else np.inf)
+
     def start(self, n: int) -> TouchState:
         """State of n robots before any touch."""
         return TouchState(
-            odometry=LegOdometry().start(n),
+            odometry=self._odometry.start(n),
             touch=np.full((n, 4, self.kept, 3), np.nan),
             feet=self._filter.start(n),
         )
@@ -182,8 +198,9 @@ class Touches:
 
         The last touch of a foot follows the foot while it stands.
         """
-        odometry, foot = LegOdometry().step(state.odometry, sensed)
-        feet = self._filter.step(state.feet, odometry.stands, sensed.period)
+        odometry, foot = self._odometry.step(state.odometry, sensed)
+        standing = odometry.stands if self.least_stance > 0 else sensed.contact
+        feet = self._filter.step(state.feet, standing, sensed.period)
         new = feet.down & ~state.feet.down
         touch = state.touch.copy()
         if new.any():
