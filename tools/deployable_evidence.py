@@ -63,12 +63,17 @@ they fall. Pace and walk by the same recipe crouch, step twice in a swing, and a
 
 **Hypothesis**, written before these runs and after looks at trot and bound on other seeds: every
 row below meets its goal, but for the touchdowns of the bound (1.2 a cycle) and the greatest speeds.
-**Seeds**: {seed} and above, which chose nothing. All robots have the preset `anymal`. An interval
-is the exact one of 95 % (Clopper and Pearson 1934).
+**Seeds**: {seed} and above, which chose nothing. All robots have the preset `anymal`, but where a
+row names other sensors. An interval is the exact one of 95 % (Clopper and Pearson 1934).
+
+**What holds**: all robots of a trot and a bound stay up on all grounds, and shift there and back.
+Beyond the hypothesis these rows miss their goals: sustained turns, of which robots make two thirds;
+the slowest stride of the trot, at which it is 0.09 m/s too slow; its touchdowns with perfect
+sensors, which it never had in training; and a bound on soft ground and at friction 0.4.
 
 ## Grounds
 
-{many} robots for 20 s: survival, with its interval, and the share of the commanded distance.
+{many} robots for 20 s: survival, with its interval.
 
 {grounds}
 
@@ -96,7 +101,7 @@ where these are commanded), and **stalled** where a robot stands.
 
 ## Bodies and delays
 
-{few} robots for 12 s, trot, pace and bound, each imperfection alone: survival and mean speed [m/s];
+{few} robots for 12 s, each imperfection alone: survival and mean speed [m/s];
 **bold** where survival is below 0.99 or the speed is off by more than 0.1 m/s.
 
 {bodies}
@@ -306,8 +311,14 @@ def _breaks(gait: str, row: dict[str, str]) -> bool:
     return not (_number(row, "survival") >= 0.99 and off <= 0.1)
 
 
+def _shown() -> tuple[str, ...]:
+    """Those of the paper's gaits that have such a policy."""
+    return tuple(gait for gait in kinds() if gait in FIRST_GAITS)
+
+
 def _grounds(cells: Cells) -> str:
-    head = ("ground", "goal", *FIRST_GAITS)
+    shown = _shown()
+    head = ("ground", "goal", *shown)
     lines = [
         (
             case,
@@ -316,7 +327,7 @@ def _grounds(cells: Cells) -> str:
                 _survival(cells["grounds", gait, case], MANY)
                 if ("grounds", gait, case) in cells
                 else ""
-                for gait in FIRST_GAITS
+                for gait in shown
             ),
         )
         for case, (_, _, least) in GROUNDS.items()
@@ -418,14 +429,14 @@ def _bodies(cells: Cells) -> str:
     lines = []
     for one in IMPERFECTIONS:
         texts = [one.name]
-        for gait in FIRST_GAITS:
+        for gait in _shown():
             row = cells.get(("bodies", gait, one.name))
             text = (
                 f"{_number(row, 'survival'):.2f}, {_number(row, 'speed_mean'):.2f}" if row else ""
             )
             texts.append(f"**{text}**" if row and _breaks(gait, row) else text)
         lines.append(tuple(texts))
-    return table.markdown(("imperfection", *FIRST_GAITS), lines)
+    return table.markdown(("imperfection", *_shown()), lines)
 
 
 def main() -> None:

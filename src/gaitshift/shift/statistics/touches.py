@@ -10,7 +10,6 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.robot.state import GRAVITY, Proprioception
 from gaitshift.shift.statistics.contacts import ContactFilter, ContactState
 
-
 AGREEMENT = 1.0
 """Velocities that differ by less agree [m/s]; ours: a swinging foot moves at twice the speed of the
 base."""
