@@ -28,6 +28,8 @@ from gaitshift.sim.sensor_config import ANYMAL, PERFECT
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
 PAGE, ROWS = RESULTS / "deployable.md", RESULTS / "deployable.csv"
 SHIFTS = RESULTS / "deployable_shifts.csv"
+TRANSITIONS = RESULTS / "deployable_transitions.csv"
+"""The table of `gaitshift transitions`."""
 CROSSINGS, NOISE_AT, NOISE_UNTIL = 64, 8.0, 20.0
 """Robots that cross the demonstration's track, and where its noise begins and ends [m]."""
 SEED = 20
@@ -86,6 +88,15 @@ sensors, which it never had in training; and a bound on soft ground and at frict
 ## Shifts
 
 {shifts}
+
+Instant shifts at random phases of the stride ([how they are judged](shifting/instant-shifts.md)):
+
+{transitions}
+
+```console
+$ gaitshift transitions trot bound --policy-files deployable/trot deployable/bound \\
+    --sensors anymal --seed 20 --out out/transitions
+```
 
 ## The ranges of the commands
 
@@ -257,6 +268,7 @@ def page() -> str:
         grounds=_grounds(cells),
         clean=_clean(cells),
         shifts=_shifts(),
+        transitions=_transitions(),
         ranges=_ranges(cells),
         stand=_stand(cells),
         bodies=_bodies(cells),
@@ -392,6 +404,21 @@ def _shifts() -> str:
         f"before the noise. It is noticed after {np.mean(ways):.2f} m, the latest after "
         f"{max(ways):.2f} m, and its end after {np.mean(homes):.2f} m."
     )
+
+
+def _transitions() -> str:
+    """The table of instant shifts."""
+    lines = [
+        (
+            f"{row['old']} to {row['new']}",
+            row["ground"],
+            f"{row['successes']} of {row['switches']}",
+            f"{float(row['low']):.4f} to {float(row['high']):.4f}",
+            row["fell"],
+        )
+        for row in (table.read(TRANSITIONS) if TRANSITIONS.exists() else [])
+    ]
+    return table.markdown(("shift", "ground", "succeed", "95 %", "fell"), lines)
 
 
 def _ranges(cells: Cells) -> str:
