@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
+from gaitshift.control.deployment.config import WATCHDOG_RANGE
 from gaitshift.control.deployment.datagram import (
     Command,
     Sensors,
@@ -11,7 +12,6 @@ from gaitshift.control.deployment.datagram import (
 )
 from gaitshift.control.deployment.inbox import Inbox
 from gaitshift.control.deployment.layout import Malformed
-from gaitshift.control.deployment.loop import WATCHDOG_RANGE
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.sim.limits import MOST_ANGLE

@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from gaitshift.control.controller import Controller
 from gaitshift.control.deployment import datagram
+from gaitshift.control.deployment.config import DeploymentConfig
 from gaitshift.control.deployment.datagram import Sensors, decode_sensors
 from gaitshift.control.deployment.inbox import Inbox
 from gaitshift.control.deployment.joint_limits import JointLimits
@@ -18,14 +19,10 @@ from gaitshift.control.deployment.layout import Malformed
 from gaitshift.control.deployment.soft_stop import DURATION, SoftStop
 from gaitshift.control.estimator import Estimation
 from gaitshift.control.switcher import Switcher, uncounted
-from gaitshift.data import check_ranges
 from gaitshift.errors import GaitshiftError
 from gaitshift.robot.command import (
     COMMAND_PARTS,
     CONTROL_PERIOD,
-    MOST_HEIGHT,
-    MOST_SPEED,
-    MOST_YAW_RATE,
     Command,
     HeadingLoop,
     SpeedLoop,
@@ -33,45 +30,12 @@ from gaitshift.robot.command import (
 from gaitshift.robot.state import Proprioception
 from gaitshift.shift import Decision
 
-WATCHDOG_RANGE = (0.02, 10.0)
-"""Shortest and longest silence that a watchdog allows [s]; ours: two control steps, and far more
-than a robot bears, for a machine that is shared."""
-
 FAREWELL = 5
 """Datagrams at the end of a stop, without stiffness; ours: so that the loss of some costs nothing.
 """
 
 _SENT_KEPT = 1000
 """Commands whose time of sending is kept, for round trips; ours: 10 s."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class DeploymentConfig:
-    """How one robot is driven."""
-
-    speed: float | None = None
-    """Commanded forward speed [m/s]; None: that of the present gait."""
-    lateral_speed: float = 0.0
-    """Commanded lateral speed, to the left [m/s]."""
-    yaw_rate: float = 0.0
-    """Commanded yaw rate, to the left [rad/s]; at 0 the robot keeps its heading."""
-    body_height: float | None = None
-    """Commanded body height, from that of the stance [m]; None: that of the present gait."""
-    watchdog: float = 0.05
-    """Longest time without valid sensors before the soft stop [s]; ours: five control steps, in
-    which a leg moves by less than a fifth of a stride."""
-
-    def __post_init__(self) -> None:
-        check_ranges(
-            self,
-            lateral_speed=(-MOST_SPEED, MOST_SPEED),
-            yaw_rate=(-MOST_YAW_RATE, MOST_YAW_RATE),
-            watchdog=WATCHDOG_RANGE,
-        )
-        if self.speed is not None:
-            check_ranges(self, speed=(0.0, MOST_SPEED))
-        if self.body_height is not None:
-            check_ranges(self, body_height=(-MOST_HEIGHT, MOST_HEIGHT))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
