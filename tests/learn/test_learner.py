@@ -8,10 +8,11 @@ import torch
 from tensordict import TensorDict
 
 from gaitshift.gait import RewardMachine, gaits
-from gaitshift.learn.learner import Learner
+from gaitshift.learn.learner import Learner, as_tensors
 from gaitshift.learn.ppo import adapted
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.env.privileged import PRIVILEGED_SIZE
 from gaitshift.sim.terrain import flat
 from training import TINY, TROT
 
@@ -153,6 +154,44 @@ def test_a_cut_episode_is_worth_what_its_true_last_observation_is_worth():
     a, b = learned_values(Entrance(), recipe, [Entrance.a, Entrance.b], iterations=100)
     assert b.item() == pytest.approx(10.0, rel=0.1)
     assert a.item() == pytest.approx(-1.0, abs=1.0)
+
+
+class Hidden(GaitEnv):
+    """All robots look alike; a reward of 1 or of 0 for ever, and only the critic may know which."""
+
+    worth = np.repeat([0.0, 1.0], 16)
+
+    def __init__(self):
+        super().__init__(TROT, flat(20.0, 20.0), 32, config=ORACLE.env, threads=1)
+
+    def reset(self, **_):
+        return np.zeros((32, 4), dtype=np.float32), {}
+
+    def privileged(self):
+        return np.repeat(self.worth[:, None], PRIVILEGED_SIZE, axis=1).astype(np.float32)
+
+    def step(self, actions):
+        none = np.zeros(32, dtype=bool)
+        info = {"reward_terms": {}, "bonus": none, "changed": none, "shows_stance": none}
+        info |= {"forward_speed": np.zeros(32), "diverged": none}
+        return self.reset()[0], self.worth, none, none, info
+
+
+@pytest.mark.parametrize("adapts", ["update", "mini_batch"])
+def test_a_critic_tells_apart_what_only_it_can_see(adapts):
+    # A reward of 1 for ever is worth 1 / (1 - γ) = 10; a critic that could not tell would say 5.
+    env, ppo = replace(ORACLE.env, privileged=True), replace(ORACLE.ppo, adapts=adapts)
+    recipe = replace(ORACLE, env=env, ppo=ppo)
+    torch.set_num_threads(1)
+    torch.manual_seed(0)
+    learner = Learner(env := Hidden(), recipe)
+    learner.ppo.actor.requires_grad_(False)
+    for _ in range(60):
+        learner.iterate()
+    seen = as_tensors(env.reset()[0], env.privileged())
+    with torch.no_grad():
+        values = learner.ppo.critic(seen).squeeze(1).numpy()
+    np.testing.assert_allclose(values, 10.0 * Hidden.worth, atol=0.5)
 
 
 SEEN = ("machine_state", "contact", "base_linear_velocity_b", "yaw_rate_command", "joint_position")

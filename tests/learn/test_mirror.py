@@ -12,7 +12,9 @@ from gaitshift.learn.learner import Learner
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.robot.description import ANYMAL_B
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
+from gaitshift.sim.env.privileged import PRIVILEGED_SIZE, privileged_mirror
 from gaitshift.sim.terrain import flat
+from gaitshift.sim.world.randomisation import SAME, Randomisation
 from symmetric import symmetric_robot
 
 MIRRORED = {
@@ -52,7 +54,7 @@ def stepping(machine, state, rng):
     return action + 0.15 * rng.normal(size=action.shape)
 
 
-def twins(gait, robot, *, steps=STEPS):
+def twins(gait, robot, *, steps=STEPS, bodies=SAME):
     """Robots under stepping actions and, after them in the same arrays, their mirror images.
 
     The images' starts, commands and actions are written from the geometry; all else is up to the
@@ -61,10 +63,16 @@ def twins(gait, robot, *, steps=STEPS):
     """
     machine = gaits.load(gait)
     machine = replace(machine, dwell_range=(4, machine.dwell_range[1]))
-    config = EnvConfig(command_interval=10_000)
+    config = EnvConfig(command_interval=10_000, randomisation=bodies)
     env = GaitEnv(machine, flat(20.0, 20.0), 2 * ROBOTS, config=config, robot=robot, threads=1)
     env.curriculum = Curriculum(strictness=0.0)
     env.reset(seed=1)
+    if bodies.varies:
+        names = list(bodies.ranges())
+        drawn = env.world.bodies[:ROBOTS]
+        drawn[:, names.index("payload_y")] *= -1.0
+        for number, values in enumerate(drawn, start=ROBOTS):
+            env.world._models._set(number, values)
     rng = np.random.default_rng(2)
 
     def pair(one, image):
@@ -92,7 +100,7 @@ def twins(gait, robot, *, steps=STEPS):
         stride_frequency=pair(frequency, frequency),
     )
     env._update_command()
-    seen, rewards, terms, changed = [], [], [], []
+    seen, known, rewards, terms, changed = [], [], [], [], []
     for _ in range(steps):
         action = stepping(machine, env._state.machine_state[:ROBOTS], rng)
         action = pair(action, mirrored_joints(action))
@@ -100,12 +108,14 @@ def twins(gait, robot, *, steps=STEPS):
         if (terminated | truncated).any():
             break
         seen.append(observation)
+        known.append(env.privileged())
         rewards.append(reward)
         terms.append(np.stack(list(info["reward_terms"].values())))
         changed.append(info["changed"])
     return SimpleNamespace(
         env=env,
         seen=np.stack(seen),
+        known=np.stack(known),
         reward=np.stack(rewards),
         terms=np.stack(terms),
         changed=np.stack(changed),
@@ -133,6 +143,19 @@ def test_the_mirror_image_is_seen_as_the_mirrored_observation_says(walked):
     order, signs = both.env.walker.observation.mirror
     robots, images = both.seen[:, :ROBOTS], both.seen[:, ROBOTS:]
     # Sums taken in another order differ in the last bit, and contacts make more of that: 5e-6.
+    np.testing.assert_allclose(signs * robots[:, :, order], images, atol=1e-4)
+    moved = (order != np.arange(len(order))) | (signs < 0)
+    apart = np.abs(robots - images).max(axis=(0, 1))
+    assert (apart[moved] > 0.01).all(), "without the mirror each of these entries would differ"
+    np.testing.assert_allclose(apart[~moved], 0.0, atol=1e-4)
+
+
+def test_the_mirror_image_of_what_the_critic_alone_sees_is_that_of_the_mirrored_robot(tmp_path):
+    bodies = Randomisation(friction=(0.5, 1.0), payload=(2.0, 5.0), payload_y=(-0.1, 0.1))
+    both = twins("trot", symmetric_robot(tmp_path), bodies=bodies)
+    order, signs = (np.array(one) for one in privileged_mirror())
+    robots, images = both.known[:, :ROBOTS], both.known[:, ROBOTS:]
+    assert robots.shape == (STEPS, ROBOTS, PRIVILEGED_SIZE)
     np.testing.assert_allclose(signs * robots[:, :, order], images, atol=1e-4)
     moved = (order != np.arange(len(order))) | (signs < 0)
     apart = np.abs(robots - images).max(axis=(0, 1))

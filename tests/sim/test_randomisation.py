@@ -30,7 +30,7 @@ def standing(n, steps=200, seed=1, push=None, **ranges):
 
 
 def drawn(world, name):
-    return np.array([world._models.drawn[robot][name] for robot in range(world.n)])
+    return world.bodies[:, list(Randomisation().ranges()).index(name)]
 
 
 def test_feet_bear_the_robot_and_its_payload():

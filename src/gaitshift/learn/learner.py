@@ -17,14 +17,21 @@ from gaitshift.learn.ppo import Mirror, WholeUpdatePPO
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.command import CONTROL_PERIOD
 from gaitshift.sim.env import GaitEnv
+from gaitshift.sim.env.privileged import privileged_mirror
 
 _GROUPS = {"actor": ["policy"], "critic": ["policy"]}
 """Actor and critic see the same observation (paper IV-A)."""
 
+_PRIVILEGED_GROUPS = {"actor": ["policy"], "critic": ["policy", "privileged"]}
+"""The critic also sees what only a simulation knows."""
 
-def as_tensors(observation: np.ndarray) -> TensorDict:
-    """An observation in rsl_rl's form."""
-    return TensorDict({"policy": torch.from_numpy(observation)}, batch_size=[len(observation)])
+
+def as_tensors(observation: np.ndarray, privileged: np.ndarray | None = None) -> TensorDict:
+    """An observation, and what the critic sees beside it, in rsl_rl's form."""
+    groups = {"policy": torch.from_numpy(observation)}
+    if privileged is not None:
+        groups["privileged"] = torch.from_numpy(privileged)
+    return TensorDict(groups, batch_size=[len(observation)])
 
 
 class DivergedError(GaitshiftError):
@@ -37,7 +44,7 @@ class Learner:
     def __init__(self, env: GaitEnv, recipe: Recipe) -> None:
         self.env = env
         self.recipe = recipe
-        self._observation = as_tensors(env.reset()[0])
+        self._observation = self._seen(env.reset()[0])
         self.ppo = _build_ppo(env, recipe, self._observation)
         self.totals: dict[str, float] = {}
 
@@ -45,7 +52,7 @@ class Learner:
         """Restarts all robots from a seed, with episodes of different ages."""
         observation, _ = self.env.reset(seed=seed)
         self.env.spread_ages()
-        self._observation = as_tensors(observation)
+        self._observation = self._seen(observation)
 
     def iterate(self) -> dict[str, float]:
         """Collects one batch, learns from it, and returns the means of the batch.
@@ -92,6 +99,11 @@ class Learner:
         self.ppo.gamma = 1.0 - (1.0 - config.discount) / horizon
         self.ppo.lam = 1.0 - (1.0 - config.gae_lambda) / trace
 
+    def _seen(self, observation: np.ndarray) -> TensorDict:
+        """What actor and critic see now."""
+        privileged = self.env.privileged() if self.recipe.env.privileged else None
+        return as_tensors(observation, privileged)
+
     def _check_weights(self) -> None:
         for network, model in (("actor", self.ppo.actor), ("critic", self.ppo.critic)):
             for name, weights in model.named_parameters():
@@ -108,9 +120,11 @@ class Learner:
         rewards = torch.from_numpy(scale * reward).float()
         if truncated.any():
             # A truncated episode has no end: its last reward gets the value of the final state.
-            final = as_tensors(info["final_obs"][truncated])
+            known = info.get("final_privileged")
+            known = None if known is None else known[truncated]
+            final = as_tensors(info["final_obs"][truncated], known)
             rewards[torch.from_numpy(truncated)] += ppo.gamma * ppo.critic(final).squeeze(1)
-        self._observation = as_tensors(observation)
+        self._observation = self._seen(observation)
         done = torch.from_numpy(terminated | truncated)
         ppo.process_env_step(self._observation, rewards, done, {})
 
@@ -169,10 +183,11 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
         "init_std": config.initial_std,
         "std_range": (0.05, 2.0),
     }
-    actor = MLPModel(observation, _GROUPS, "actor", 12, **network, distribution_cfg=distribution)
+    groups = _PRIVILEGED_GROUPS if recipe.env.privileged else _GROUPS
+    actor = MLPModel(observation, groups, "actor", 12, **network, distribution_cfg=distribution)
     with torch.no_grad():  # so the first actions are close to the stance
         cast(torch.nn.Linear, actor.mlp[-1]).weight.mul_(config.output_gain)
-    critic = MLPModel(observation, _GROUPS, "critic", 1, **network)
+    critic = MLPModel(observation, groups, "critic", 1, **network)
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
     is_symmetric = config.mirror and env.machine.mirrored_states() is not None
     mirror = _mirror(env) if is_symmetric else None
@@ -204,10 +219,13 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
 def _mirror(env: GaitEnv) -> Mirror:
     """What a mirror makes of the environment's observations and actions."""
     order, signs = env.walker.observation.mirror
+    privileged_order, privileged_signs = privileged_mirror()
     joint_order, joint_signs = JOINT_MIRROR
     return Mirror(
         order=torch.from_numpy(order),
         signs=torch.from_numpy(signs),
+        privileged_order=torch.tensor(privileged_order),
+        privileged_signs=torch.tensor(privileged_signs, dtype=torch.float32),
         joint_order=torch.tensor(joint_order),
         joint_signs=torch.tensor(joint_signs, dtype=torch.float32),
     )
@@ -220,9 +238,12 @@ def _symmetry(mirror: Mirror) -> dict[str, Any]:
         env: Any, obs: TensorDict | None, actions: torch.Tensor | None
     ) -> tuple[TensorDict | None, torch.Tensor | None]:
         if obs is not None:
-            seen = obs["policy"]
-            both = torch.cat([seen, mirror.observation(seen)])
-            obs = TensorDict({"policy": both}, batch_size=[len(both)])
+            image_of = {"policy": mirror.observation, "privileged": mirror.privileged}
+            both = {
+                name: torch.cat([seen, image_of[name](seen)])
+                for name, seen in cast("dict[str, torch.Tensor]", obs).items()
+            }
+            obs = TensorDict(both, batch_size=[2 * len(obs)])
         if actions is not None:
             actions = torch.cat([actions, mirror.action(actions)])
         return obs, actions

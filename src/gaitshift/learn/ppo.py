@@ -17,6 +17,10 @@ class Mirror:
     """For each part of the image of an observation the part of the observation itself."""
     signs: torch.Tensor
     """Factors of 1 or -1 on the parts of the image."""
+    privileged_order: torch.Tensor
+    """As `order`, for what the critic alone sees."""
+    privileged_signs: torch.Tensor
+    """As `signs`, for what the critic alone sees."""
     joint_order: torch.Tensor
     """As `order`, for actions."""
     joint_signs: torch.Tensor
@@ -25,6 +29,10 @@ class Mirror:
     def observation(self, seen: torch.Tensor) -> torch.Tensor:
         """The images of observations (..., D)."""
         return self.signs * seen[..., self.order]
+
+    def privileged(self, seen: torch.Tensor) -> torch.Tensor:
+        """The images of what the critic alone sees (..., P)."""
+        return self.privileged_signs * seen[..., self.privileged_order]
 
     def action(self, action: torch.Tensor) -> torch.Tensor:
         """The images of actions (..., 12)."""
@@ -104,19 +112,30 @@ class WholeUpdatePPO(PPO):
     def _samples(self) -> dict[str, torch.Tensor]:
         """All samples of the storage by name, one a row.
 
-        `observation`, normalised, and `action` are (n, 2, …): the sample and its mirror image; or
-        (n, 1, …) without a mirror.
+        `observation` and `judged`, which the critic sees, both normalised, and `action` are
+        (n, 2, …): the sample and its mirror image; or (n, 1, …) without a mirror.
         """
         store = cast(Any, self.storage)
-        observation = store.observations.flatten(0, 1)["policy"]
+        samples = store.observations.flatten(0, 1)
+        observation = samples["policy"]
         action = store.actions.flatten(0, 1)
         mean, std = (part.flatten(0, 1) for part in store.distribution_params)
         seen, done = [observation], [action]
         if self.mirror is not None:
             seen.append(self.mirror.observation(observation))
             done.append(self.mirror.action(action))
+        both = torch.stack(seen, 1)
+        normalised = cast(Any, self.actor).obs_normalizer(both)
+        judged = normalised
+        if (privileged := samples.get("privileged", None)) is not None:
+            known = [privileged]
+            if self.mirror is not None:
+                known.append(self.mirror.privileged(privileged))
+            judged = torch.cat((both, torch.stack(known, 1)), dim=-1)
+            judged = cast(Any, self.critic).obs_normalizer(judged)
         return {
-            "observation": cast(Any, self.actor).obs_normalizer(torch.stack(seen, 1)),
+            "observation": normalised,
+            "judged": judged,
             "action": torch.stack(done, 1),
             "advantage": store.advantages.flatten(),
             "return": store.returns.flatten(),
@@ -153,7 +172,7 @@ class WholeUpdatePPO(PPO):
         The actor learns from samples and their images, the critic from either in turn: trainings
         then take as many iterations, and an update a quarter less time.
         """
-        value = self.critic.mlp(part["observation"][:, turn]).squeeze(-1)
+        value = self.critic.mlp(part["judged"][:, turn]).squeeze(-1)
         log_prob = self._distribution.log_prob(part["action"])
         ratio = torch.exp(log_prob - part["log_prob"][:, None])
         clipped = ratio.clamp(1.0 - self.clip_param, 1.0 + self.clip_param)

@@ -174,7 +174,8 @@ class Run:
         }
         info = describe(self.learner.env, training)
         ppo = self.learner.ppo
-        export(ppo.actor, info, path or self.folder / POLICY, self._averaged(), ppo.critic)
+        critic = None if self.recipe.env.privileged else ppo.critic  # which needs more than a robot
+        export(ppo.actor, info, path or self.folder / POLICY, self._averaged(), critic)
 
     def _averaged(self) -> torch.nn.Sequential:
         """The present actor's layers, averaged with those of the last checkpoints."""

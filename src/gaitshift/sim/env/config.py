@@ -27,6 +27,8 @@ class EnvConfig:
     see an estimate."""
     observed: tuple[str, ...] = DEFAULT_SLICES
     """Slices of the observation, in order."""
+    privileged: bool = False
+    """Whether the critic sees what only a simulation knows beside the observation; ours."""
     gains: str = "default"
     """Preset of the robot's joint gains."""
     episode_steps: int = 1000

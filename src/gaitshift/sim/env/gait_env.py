@@ -19,6 +19,7 @@ from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Privileged, Proprioception
 from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.episodes import Commander, MixedStart, mix
+from gaitshift.sim.env.privileged import privileged
 from gaitshift.sim.push import Pusher
 from gaitshift.sim.reward import Swings, earned_bonus, walk_reward, with_bonus
 from gaitshift.sim.terrain import Terrain
@@ -35,7 +36,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     the terrain. Robots restart in the same step (`AutoresetMode.SAME_STEP`); the observation that
     ended an episode is in `info["final_obs"]`, where `info["_final_obs"]` is true.
     `info["reward_terms"]` has each weighted term of R_walk, `info["bonus"]` the machine's bonus,
-    and `info["changed"]` whether the machine changed its state.
+    and `info["changed"]` whether the machine changed its state. Where the config asks for it,
+    `privileged()` is what only a simulation knows, and `info["final_privileged"]` belongs to
+    `info["final_obs"]`.
     """
 
     def __init__(
@@ -189,6 +192,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         if ids.size == 0:
             return observation
         info["final_obs"], info["_final_obs"] = observation, done
+        if self.config.privileged:
+            info["final_privileged"] = self.privileged()
         self._restart(ids)
         return self._observation()
 
@@ -312,6 +317,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def commands(self) -> dict[str, Any]:
         """Nominal value and range of the forward-speed and stride-frequency commands."""
         return self._commander.ranges()
+
+    def privileged(self) -> Float32[np.ndarray, "N P"]:
+        """What only a simulation knows of the robots now (`gaitshift.sim.env.privileged`)."""
+        return privileged(self.world.ideal, self.world.truth, self.world.bodies)
 
     def _observation(self) -> Observations:
         return self.walker.observe(self._state, self._sensed, self._commander.command)

@@ -82,6 +82,9 @@ class Randomisation:
 SAME = Randomisation()
 """Robots that are all alike."""
 
+ALIKE: Float[np.ndarray, " 8"] = np.array([least for least, _ in SAME.ranges().values()])
+"""What a robot has that differs in nothing, in the order of the ranges."""
+
 
 class Models:
     """A model for each robot, drawn anew in place."""
@@ -101,12 +104,14 @@ class Models:
         self._nominal = [nominal[i % len(nominal)] for i in range(n)]
         self.each = [copy(model) for model in self._nominal]
         """The model of each robot."""
-        self.drawn: dict[int, dict[str, float]] = {}
-        """What was drawn for each robot, by its number and by the name of the range."""
+        self.drawn = np.tile(ALIKE, (n, 1))
+        """What was drawn for each robot, as (n, 8) in the order of the ranges."""
+        self._is_drawn = np.zeros(n, dtype=bool)
         self._data = mujoco.MjData(nominal[0])
         (self._own,) = np.nonzero(nominal[0].geom_bodyid)
-        for robot, drawn in (before.drawn if before else {}).items():
-            self._set(robot, drawn)
+        if before is not None:
+            for robot in map(int, np.flatnonzero(before._is_drawn)):
+                self._set(robot, before.drawn[robot])
 
     def draw(
         self, ids: Int[np.ndarray, " K"], rng: np.random.Generator, share: float = 1.0
@@ -115,16 +120,14 @@ class Models:
 
         `share` shrinks all ranges towards the values of a robot that differs in nothing, 0 to 1.
         """
-        ranges, alike = self.config.ranges(), SAME.ranges()
+        ranges: Float[np.ndarray, "8 2"] = np.array(list(self.config.ranges().values()))
         for robot in map(int, ids):
-            drawn = {name: float(rng.uniform(*two)) for name, two in ranges.items()}
-            self._set(
-                robot,
-                {n: alike[n][0] + share * (value - alike[n][0]) for n, value in drawn.items()},
-            )
+            drawn = rng.uniform(ranges[:, 0], ranges[:, 1])
+            self._set(robot, ALIKE + share * (drawn - ALIKE))
 
-    def _set(self, robot: int, drawn: dict[str, float]) -> None:
-        self.drawn[robot] = drawn
+    def _set(self, robot: int, values: Float[np.ndarray, " 8"]) -> None:
+        self.drawn[robot], self._is_drawn[robot] = values, True
+        drawn = dict(zip(self.config.ranges(), values, strict=True))
         model, nominal = self.each[robot], self._nominal[robot]
         if self.config.friction != SAME.friction:
             model.geom_friction[self._own, 0] = drawn["friction"]

@@ -25,7 +25,7 @@ from gaitshift.sim.sensor_config import PERFECT, SensorConfig
 from gaitshift.sim.terrain import Fields, Terrain
 from gaitshift.sim.world.divergence import DIVERGED, FASTEST, Divergence, History
 from gaitshift.sim.world.model import Fidelity, build_model
-from gaitshift.sim.world.randomisation import SAME, Models, Randomisation
+from gaitshift.sim.world.randomisation import ALIKE, SAME, Models, Randomisation
 
 CLEAR_OF_GROUND = 20.0
 """Height at which robots are posed before they are set on the ground [m]; ours."""
@@ -125,6 +125,11 @@ class World:
         """
         if self._models is not None:
             self._models.draw(ids, rng, share)
+
+    @property
+    def bodies(self) -> Float[np.ndarray, "N 8"]:
+        """What was drawn for each robot, in the order of `Randomisation`."""
+        return np.tile(ALIKE, (self.n, 1)) if self._models is None else self._models.drawn.copy()
 
     def reseed(self, seed: int) -> None:
         """Begins the errors of sensors and link anew with this seed, from the next `place` on."""
