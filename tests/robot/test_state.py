@@ -292,6 +292,27 @@ def test_robots_put_back_take_the_places_of_those_they_were():
     assert_same(step, random_truth(4))  # nothing was written to
 
 
+@pytest.mark.parametrize("field", [field.name for field in fields(Proprioception)])
+def test_a_copy_with_another_field_derives_what_a_new_record_would(field):
+    one, other = random_sensed(3), random_sensed(3, seed=5)
+    for name in DERIVED:
+        getattr(one, name)  # computed before the copy
+    values = {field: getattr(other, field)}
+    copy, anew = one.having(**values), replace(one, **values)
+    assert_same(copy, anew)
+    for name in DERIVED:
+        np.testing.assert_array_equal(getattr(copy, name), getattr(anew, name), err_msg=name)
+
+
+def test_a_copy_shares_what_was_computed_where_it_still_holds():
+    blind = replace(random_sensed(3), velocity_b=None)
+    rotation, velocity = blind.rotation, np.ones((3, 3))
+    seeing = blind.having(velocity_b=velocity, time=3.0)
+    assert seeing.rotation is rotation
+    assert seeing.forward_speed.tolist() == [1.0] * 3
+    assert seeing.having(velocity_b=2 * velocity).forward_speed.tolist() == [2.0] * 3
+
+
 def test_single_precision_is_of_real_numbers_alone():
     log = entry(5, 3)
     single = log.as_type(np.float32)

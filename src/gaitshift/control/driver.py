@@ -1,7 +1,6 @@
 """Drives N robots by trained policies, each in its present gait."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -115,7 +114,7 @@ class Driver:
         """Sets the machines of these robots, of gait number `index`, to a state."""
         machine_state, steps = self.state.machine_state.copy(), self.state.steps_in_state.copy()
         machine_state[ids], steps[ids] = state, 0
-        self.state = replace(self.state, machine_state=machine_state, steps_in_state=steps)
+        self.state = self.state.having(machine_state=machine_state, steps_in_state=steps)
         self._changes_due[ids] = len(self.repertoire.machines[index].states)
 
     def act(self, sensed: Proprioception, command: Command) -> Float[np.ndarray, "N 12"]:
@@ -131,7 +130,7 @@ class Driver:
             observation = policy.walker.observe(state, felt, asked)
             self._acted_on.append((policy, ids, observation))
             last_action[ids], target[ids] = policy.walker.target(policy(observation))
-        self.state = replace(self.state, last_action=last_action)
+        self.state = self.state.having(last_action=last_action)
         return target
 
     def value(self) -> Float[np.ndarray, " N"] | None:
@@ -148,7 +147,7 @@ class Driver:
         height = self.state.touch_height
         if np.isnan(height).any():
             height = np.where(np.isnan(height), sensed.foot_height, height)
-            self.state = replace(self.state, touch_height=height)
+            self.state = self.state.having(touch_height=height)
 
     def _check(self) -> None:
         named = [(gait, policy.info) for gait, policy in self.policies.items()]

@@ -23,7 +23,7 @@ filterpy, robot_localization, InEKF and the like estimate for one robot at a tim
 for N in one pass of NumPy.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -159,7 +159,7 @@ class Estimator:
             angular_velocity_b=sensed.need("angular_velocity_b", "the estimator"),
             joint_position=sensed.need("joint_position", "the estimator"),
         )
-        estimated = replace(sensed, velocity_b=after.velocity_b)
+        estimated = sensed.having(velocity_b=after.velocity_b)
         vars(estimated)["rotation"] = sensed.rotation  # which the policy would compute again
         return after, estimated
 
@@ -241,5 +241,5 @@ class Estimation:
     def seen(self, sensed: Proprioception) -> Proprioception:
         """The same before any time has passed since the last call, or since a restart."""
         if sensed.velocity_b is None and sensed.specific_force_b is not None:
-            return replace(sensed, velocity_b=self._state.velocity_b)
+            return sensed.having(velocity_b=self._state.velocity_b)
         return sensed

@@ -69,7 +69,7 @@ class Autonomous:
     ) -> Decision:
         """Updates the counters; a robot whose edge fires changes to the target gait."""
         if "value" in self.graph.needs and sensed.value is None:
-            sensed = replace(sensed, value=controller.value())
+            sensed = sensed.having(value=controller.value())
         rough = None if self._rough is None or truth is None else self._rough(truth)
         gaits = controller.repertoire.gaits
         known = np.array([_index(self.graph.gaits, gait) for gait in gaits])

@@ -8,13 +8,13 @@ y left, z up). Legs are in the order of `gaitshift.robot.legs.LEGS`, joints are 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
-from typing import Any, Self, cast, get_args
+from typing import Any, ClassVar, Self, cast, get_args
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from gaitshift.errors import GaitshiftError
-from gaitshift.robot.command import CONTROL_PERIOD
+from gaitshift.robot.command import COMMAND_PARTS, CONTROL_PERIOD
 
 GRAVITY = 9.81
 """[m/s²]"""
@@ -29,6 +29,9 @@ class Batch:
 
     Other fields (a time, a name) apply to all entries. Fields may be `Batch`es themselves.
     """
+
+    apart: ClassVar[frozenset[str]] = frozenset()
+    """Fields from which no cached property is computed."""
 
     def __getitem__(self, index: Any) -> Self:
         """Every array at this index of its first axis: one or several steps of a log."""
@@ -57,6 +60,19 @@ class Batch:
                 values[name] = value.copy()
                 values[name][ids] = getattr(part, name)
         return replace(cast(Any, self), **values)
+
+    def having(self, **values: Any) -> Self:
+        """A copy with these values of fields; it shares what was computed, where that still holds.
+
+        That is where a field was None before, or where nothing is computed from it (`apart`).
+        """
+        before = self.__dict__
+        holds = all(name in self.apart or before[name] is None for name in values)
+        kept = before if holds else {name: before[name] for name in trailing_axes(type(self))}
+        copy = object.__new__(type(self))  # `replace` takes ten times as long
+        copy.__dict__.update(kept)
+        copy.__dict__.update(values)
+        return copy
 
     def as_type(self, precision: type[np.floating[Any]]) -> Self:
         """A copy with all real numbers in this precision."""
@@ -134,6 +150,9 @@ class Proprioception(Moving):
     Conditions and policies read only this record. The first three fields are required; the others
     are None where a robot does not measure them, and code that needs one raises an error.
     """
+
+    _commands = tuple(f"{name}_command" for name in COMMAND_PARTS)
+    apart = frozenset(("has_heading", "time", "period", "mass", "value", *_commands))
 
     contact: Bool[np.ndarray, "*batch 4"]
     """Whether each foot is in contact with the ground."""

@@ -6,7 +6,9 @@ bits that it computes inside a simulation. Nothing here has a state or reads a c
 """
 
 import zlib
-from typing import Any
+from functools import cache
+from math import sqrt
+from typing import Any, cast
 
 import numpy as np
 
@@ -156,17 +158,28 @@ def opened(data: bytes, layout: np.dtype[Any], kind: int) -> Any:
     return record
 
 
+@cache
+def _reals(layout: np.dtype[Any]) -> tuple[tuple[str, ...], np.ndarray, np.ndarray, np.ndarray]:
+    """All real numbers of a layout: their names, bytes, greatest magnitudes, and if NaN may be."""
+    names, places = list[str](), list[int]()
+    for name in layout.names or ():
+        if name in RANGES:
+            field, offset = cast(Any, layout.fields)[name][:2]
+            names += [name] * (field.itemsize // 8)
+            places += range(offset, offset + field.itemsize)
+    most = np.array([RANGES[name] for name in names])
+    return tuple(names), np.array(places), most, np.isin(names, _MAY_BE_NAN)
+
+
 def _wrong(record: Any) -> str | None:
     """The first number out of range, NaN among them; None where all are in range."""
-    for name in record.dtype.names:
-        most = RANGES.get(name)
-        if most is None:
-            continue
-        value: np.ndarray = np.abs(record[name])
-        if not ((value <= most) | (np.isnan(value) & (name in _MAY_BE_NAN))).all():
-            return name
-        if name == "orientation":
-            length = float(np.linalg.norm(record[name]))
-            if not abs(length - 1.0) <= MOST_QUATERNION_ERROR:
-                return name
+    names, places, most, may_be_nan = _reals(record.dtype)
+    value = np.abs(np.frombuffer(record.tobytes(), np.uint8)[places].view("<f8"))
+    is_right = (value <= most) | (np.isnan(value) & may_be_nan)
+    if not is_right.all():
+        return names[int(is_right.argmin())]
+    if "orientation" in record.dtype.names:
+        w, x, y, z = record["orientation"].tolist()
+        if not abs(sqrt(w * w + x * x + y * y + z * z) - 1.0) <= MOST_QUATERNION_ERROR:
+            return "orientation"
     return None

@@ -195,15 +195,14 @@ class Deployment:
         if self._seen is not None and newest.sequence == self._seen[0]:
             return self._seen[1]
         steps = 1 if self._seen is None else newest.sequence - self._seen[0]
-        late = replace(newest.sensed, period=steps * CONTROL_PERIOD)  # some were lost
-        sensed = replace(self._estimation.see(late), period=CONTROL_PERIOD)
+        late = newest.sensed.having(period=steps * CONTROL_PERIOD)  # some were lost
+        sensed = self._estimation.see(late).having(period=CONTROL_PERIOD)
         self._seen = newest.sequence, sensed
         return sensed
 
     def _with_command(self, sensed: Proprioception) -> Proprioception:
         """Sensors with the time and the command during the step that ended."""
-        return replace(
-            sensed,
+        return sensed.having(
             time=self._steps * CONTROL_PERIOD,
             mass=self.controller.robot.mass,
             **self._wanted.sensed(),

@@ -38,8 +38,7 @@ class RobotRecorder:
             self._gaits.append(decided.gait)
         if robot.is_driven and not command.is_stop:
             self._fallen = self._fallen | world.truth.body_contact | world.truth.diverged
-        sensed = replace(
-            world.sensed,
+        sensed = world.sensed.having(
             time=(len(self._steps) + 1) * CONTROL_PERIOD,
             **{f"{n}_command": np.array([getattr(decided, n)]) for n in COMMAND_PARTS},
         )

@@ -120,8 +120,7 @@ class Walk:
         is_off = (truth.clearance < -OVER_THE_EDGE).all(axis=1)
         self.fallen = self.fallen | truth.body_contact | truth.diverged | is_off
         controller.see(sensed, self._asked)
-        self.sensed = replace(
-            sensed,
+        self.sensed = sensed.having(
             time=self.time,
             **self.wanted.sensed(),
             value=controller.value() if self.config.values else None,
