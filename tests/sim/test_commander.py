@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gaitshift.control.observation import FULL_SLICES
 from gaitshift.gait import gaits
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
-from hopping import FLAT, HOP, arbitrary_actions, commanded, feed, ranged
+from gaitshift.sim.env.episodes import Commander
+from hopping import FLAT, HOP, RANGED, arbitrary_actions, commanded, feed, ranged
 
 
 def draws(env, resets=30):
@@ -47,12 +49,60 @@ def test_a_lateral_speed_and_a_height_are_drawn_from_their_ranges_or_nominal():
     assert (height.min() / 10, height.max() / 10) == pytest.approx((-0.06, 0.015), abs=0.004)
 
 
+def test_a_span_of_heights_is_for_gaits_that_have_no_range_of_their_own():
+    config = EnvConfig(observed=FULL_SLICES, command_share=1.0, height_span=0.03)
+    env = GaitEnv(HOP, FLAT, 10, config=config, threads=1)
+    _, height = aside(env)
+    assert (height.min() / 10, height.max() / 10) == pytest.approx((-0.03, 0.03), abs=0.003)
+    assert env.commands()["height_range"] == [-0.03, 0.03]
+    ends = GaitEnv(RANGED, FLAT, 1, config=config, threads=1).commands()["height_range"]
+    assert ends == [-0.1, 0.05]
+
+
 def test_a_gait_that_stands_is_not_asked_to_turn():
     env = GaitEnv(gaits.load("stand"), FLAT, 4, config=EnvConfig(command_interval=5), threads=1)
     env.reset(seed=0)
     turn = env.walker.observation.slices["yaw_rate_command"]
     for action in arbitrary_actions(0, 20, 4, size=0.2):
         assert not env.step(action)[0][:, turn].any()
+
+
+def commander(n, **config):
+    """Commands of robots on lines along x, drawn every ten steps, and a function for a step."""
+    config = EnvConfig(command_interval=10, command_share=0.5, **config)
+    made = Commander(RANGED, config, n, np.random.default_rng(0))
+    made.restart(np.arange(n), np.zeros(n), 1.0)
+
+    def rate(step, yaw, scale=1.0):
+        made.update(np.full(n, step), yaw, scale)
+        return made.command.yaw_rate
+
+    return made, rate
+
+
+def test_a_share_of_the_robots_turns_at_a_rate_of_its_own_until_the_next_draw():
+    _, rate = commander(400, turn_share=0.25, heading_range=0.1)
+    # The yaws change, so that only a robot that turns has the same command in all steps.
+    rates = [rate(step, np.full(400, 0.01 * step)) for step in range(9, 19)]
+    is_turning = np.ptp(rates, axis=0) == 0.0
+    assert is_turning.mean() == pytest.approx(0.25, abs=0.07)
+    asked = rates[0][is_turning]
+    assert (asked.min(), asked.max()) == pytest.approx((-0.5, 0.5), abs=0.05)
+    assert abs(asked.mean()) < 0.1
+    again = [rate(step, np.full(400, 0.01 * step), 0.2) for step in (19, 20)]
+    assert not np.isin(again[0], asked).any(), "all are drawn anew"
+    slow = again[0][again[0] == again[1]]
+    assert np.abs(slow).max() == pytest.approx(0.1, abs=0.01)
+
+
+def test_a_robot_that_has_turned_keeps_the_heading_that_it_has_then():
+    made, rate = commander(400, turn_share=0.5, heading_range=1e-9)
+    yaw = np.full(400, 0.2)
+    is_turning = ~np.isclose(rate(9, yaw), -0.3)  # the others turn back, by 1.5 times the error
+    np.testing.assert_allclose(made.heading, np.where(is_turning, 0.2, 0.0), atol=1e-6)
+    later = rate(19, yaw)
+    keeps = is_turning & (np.abs(later) < 1e-6)
+    assert keeps.sum() == pytest.approx(100, abs=30), "half of a half go straight on"
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.6])

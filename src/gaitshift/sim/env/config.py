@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from gaitshift.control.observation import DEFAULT_SLICES, PAPER_SLICES, check_slices
 from gaitshift.data import check_ranges
 from gaitshift.errors import GaitshiftError
-from gaitshift.robot.command import MOST_SPEED, PAPER_SPEED, HeadingLoop
+from gaitshift.robot.command import MOST_HEIGHT, MOST_SPEED, PAPER_SPEED, HeadingLoop
 from gaitshift.sim.push import PushConfig
 from gaitshift.sim.reward import RewardConfig
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
@@ -41,6 +41,12 @@ class EnvConfig:
     heading_range: float = 0.8
     """Wanted headings are drawn within ± this of the present line [rad]; 0 leaves the yaw-rate
     command at zero, as in the paper. Ours."""
+    height_span: float = 0.0
+    """Body heights are commanded within ± this of a gait's nominal height where it has no range of
+    its own [m]; ours: where no height is asked for, robots that differ crouch."""
+    turn_share: float = 0.0
+    """Share of the draws of a command in which the robot has no wanted heading and turns at a yaw
+    rate drawn within ± that of `heading_loop` until the next draw; ours."""
     command_interval: int = 300
     """Control steps between two draws of the wanted heading, speed and stride frequency; ours."""
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
@@ -59,6 +65,8 @@ class EnvConfig:
             episode_steps=(1, 1_000_000),
             command_share=(0.0, 1.0),
             heading_range=(0.0, 3.2),
+            height_span=(0.0, MOST_HEIGHT),
+            turn_share=(0.0, 1.0),
             command_interval=(1, 1_000_000),
             joint_noise=(0.0, 1.0),
             velocity_noise=(0.0, 10.0),

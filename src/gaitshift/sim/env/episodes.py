@@ -23,6 +23,8 @@ class Commander:
         self._line: Float[np.ndarray, " N"] = np.zeros(n)
         self.heading: Float[np.ndarray, " N"] = np.zeros(n)
         """Wanted heading of each robot [rad]."""
+        self._turn: Float[np.ndarray, " N"] = np.full(n, np.nan)
+        # [rad/s]; NaN: the robot has a wanted heading
         self.command = self._own(n)
         """The present command."""
 
@@ -57,6 +59,11 @@ class Commander:
             self._draw(due, scale)
         if turns:
             yaw_rate = config.heading_loop.yaw_rate(yaw, self.heading)
+            if config.turn_share > 0:
+                is_turning = ~np.isnan(self._turn)
+                yaw_rate = np.where(is_turning, self._turn, yaw_rate)
+                self._line = np.where(is_turning, yaw, self._line)
+                self.heading = np.where(is_turning, yaw, self.heading)
             self.command = replace(self.command, yaw_rate=yaw_rate)
 
     def ranges(self) -> dict[str, Any]:
@@ -108,6 +115,11 @@ class Commander:
             )
         if machine.has_height:
             self._draw_one(ids, "body_height", machine.height_range, scale)
+        if self._config.turn_share > 0:
+            is_turning = rng.random(len(ids)) < self._config.turn_share
+            most = scale * self._config.heading_loop.yaw_rate_limit
+            turn = rng.uniform(-most, most, len(ids))
+            self._turn[ids] = np.where(is_turning, turn, np.nan)
 
     def _draw_one(
         self, ids: Int[np.ndarray, " K"], name: str, ends: tuple[float, float], scale: float

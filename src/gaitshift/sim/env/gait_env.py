@@ -52,7 +52,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         threads: int = 0,
     ) -> None:
         self.config = EnvConfig() if config is None else config
-        self.machine = machine
+        self.machine = machine = _with_heights(machine, self.config.height_span)
         self.robot = robot
         self.num_envs = num_envs
         self.walker = Walker(
@@ -324,3 +324,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
 
     def _observation(self) -> Observations:
         return self.walker.observe(self._state, self._sensed, self._commander.command)
+
+
+def _with_heights(machine: RewardMachine, span: float) -> RewardMachine:
+    """The gait with body heights within ± this of its own [m], if it has no range of heights."""
+    if span == 0 or machine.has_height:
+        return machine
+    return replace(machine, height_range=(machine.height - span, machine.height + span))
