@@ -20,6 +20,7 @@ from typing import Any
 
 from gaitshift import table
 from gaitshift.lab.benchmark.peers import OURS
+from gaitshift.lab.benchmark.step import step_times
 from gaitshift.learn.progress import read
 
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
@@ -234,6 +235,8 @@ def start() -> list[table.Row]:
         )
         steps.append(float(done.stdout.rsplit(": ", 1)[1].split(" ms")[0]) / 1e3)
     rows.append({"what": "a step of `examples/runtime.py`", "seconds": f"{median(steps):.5f}"})
+    step = step_times()["control_step"] / 1e3
+    rows.append({"what": "a control step of `gaitshift deploy`", "seconds": f"{step:.5f}"})
     return rows
 
 

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from gaitshift.cli import main
 from gaitshift.gait import gaits
 from gaitshift.lab.benchmark import peers, speed
+from gaitshift.lab.benchmark.step import step_times
 from gaitshift.sim.env import GaitEnv
 from gaitshift.sim.terrain import flat
 
@@ -77,7 +79,7 @@ def test_the_help_tells_the_measurements_apart(capsys):
         main(["bench", "--help"])
     told = capsys.readouterr().out
     words = (
-        "{speed,growth,peers,time-to-gait,page,replay}",
+        "{speed,growth,peers,time-to-gait,page,step,replay}",
         "--baseline-budget",
         "--robots",
         "--page-seconds",
@@ -91,6 +93,15 @@ def test_the_replay_is_measured_with_and_without_a_leak(capsys, monkeypatch):
     found = json.loads(capsys.readouterr().out)
     assert list(found) == ["no_leak_s", "leak_s"]
     assert all(0.0 < seconds < 60.0 for seconds in found.values())
+
+
+def test_the_step_of_one_robot_takes_longer_than_its_parts(capsys, monkeypatch):
+    monkeypatch.setattr("gaitshift.cli.bench.step_times", partial(step_times, 50))
+    main(["bench", "step", "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["control_step", "physics", "estimator", "policy", "condition"]
+    for part in ("estimator", "policy", "condition"):
+        assert 0.0 < found[part] < found["control_step"]
 
 
 def test_a_table_of_trainings_with_a_wrong_cell_is_named(capsys, tmp_path):

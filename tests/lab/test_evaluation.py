@@ -16,6 +16,7 @@ from gaitshift.lab.evaluation import (
     EvaluationConfig,
     RolloutConfig,
     evaluate,
+    flat_verdict,
     rollout,
     run_demo,
 )
@@ -375,3 +376,13 @@ def test_robots_with_real_sensors_shift_there_and_back():
     shifts = [[(shift["to"], shift["x_m"]) for shift in one["switches"]] for one in summaries]
     assert all(one[0][0] == "bound" and 8.0 < one[0][1] < 14.0 for one in shifts)
     assert sum([to for to, _ in one] == ["bound", "trot"] for one in shifts) >= 3
+
+
+def test_the_verdict_of_a_training_is_that_of_a_walk_with_its_sensors():
+    trot, sensors = policy.load("deployable/trot"), sensor_preset("cheap")
+    verdict = flat_verdict(trot, sensors)
+    walk = EvaluationConfig(episodes=16, seconds=5.0, sensors=sensors)
+    figures, _ = evaluate(trot, walk)
+    for name in ("survival", "speed_mean", "cost_of_transport"):
+        assert verdict[name] == pytest.approx(figures[name], rel=1e-3)
+    assert verdict["cost_of_transport"] != flat_verdict(trot)["cost_of_transport"]

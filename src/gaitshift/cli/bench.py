@@ -31,6 +31,7 @@ from gaitshift.lab.benchmark.speed import (
     replay_speed,
     training_speed,
 )
+from gaitshift.lab.benchmark.step import step_times
 
 if TYPE_CHECKING:
     from gaitshift.lab.benchmark.time_to_gait import TimeToGait
@@ -95,11 +96,13 @@ class Bench:
     page: whether the page of `gaitshift view` runs in real time on one core at 50 frames per
     second.
 
+    step: how long a control step of `gaitshift deploy` takes for one robot, and its parts.
+
     replay: how long `identify` takes for 1000 episodes of 20 s, 100 α and 1000 β.
     """
 
     what: Annotated[
-        Literal["speed", "growth", "peers", "time-to-gait", "page", "replay"],
+        Literal["speed", "growth", "peers", "time-to-gait", "page", "step", "replay"],
         tyro.conf.Positional,
     ] = "speed"
     """What to measure."""
@@ -122,6 +125,8 @@ class Bench:
             self._measure_peers()
         elif self.what == "page":
             self._measure_page()
+        elif self.what == "step":
+            self._measure_step()
         elif self.what == "replay":
             self._measure_replay()
         else:
@@ -191,6 +196,13 @@ class Bench:
         ]
         figures = {f"robots_{robots}": of for robots, of in found.items()}
         self._emit(figures, "bench: the live page on one core", rows)
+
+    def _measure_step(self) -> None:
+        with progress("walking") as report:
+            found = step_times(seed=self.speed.seed)
+            report(1, 1)
+        rows = [(name.replace("_", " "), f"{value:.3f} ms") for name, value in found.items()]
+        self._emit(found, "bench: a control step of one robot, medians", rows)
 
     def _measure_replay(self) -> None:
         try:

@@ -199,8 +199,9 @@ class _Bar:
         self._progress.stop()
 
     def judge(self, path: Path) -> "Row":
-        """A short evaluation of the present policy."""
-        self.verdict = flat_verdict(policy.load(path, self._run.robot))
+        """A short evaluation of the present policy, with the sensors of the training."""
+        sensors = self._run.recipe.env.sensors
+        self.verdict = flat_verdict(policy.load(path, self._run.robot), sensors)
         return self.verdict
 
     def keep(self, divergence: "Divergence", path: Path) -> None:

@@ -237,16 +237,17 @@ VERDICT_FIGURES = (
 )
 
 
-def flat_verdict(policy: Policy) -> dict[str, Any]:
+def flat_verdict(policy: Policy, sensors: SensorConfig = PERFECT) -> dict[str, Any]:
     """The verdict on a policy on flat ground, at its nominal speed and stride frequency.
+
+    The robots have these `sensors`.
 
     `gait` is the name by the contacts alone. `clean` is true if that name is the policy's gait and
     all limits are met. `misses` lists the figures that miss their limits, with the worst foot,
     separated by "; ". The other figures are defined in `gait_analysis.measure`.
     """
-    figures, _ = evaluate(
-        policy, EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS)
-    )
+    config = EvaluationConfig(episodes=VERDICT_ROBOTS, seconds=VERDICT_SECONDS, sensors=sensors)
+    figures, _ = evaluate(policy, config)
     verdict = figures["verdict"]
     return {
         "gait": verdict["gait"],
