@@ -24,6 +24,7 @@ from gaitshift.lab.gait_analysis.phase import Phases, axial_of, ideal_of, phase_
 from gaitshift.lab.gait_analysis.sample import steady
 from gaitshift.lab.log import Log
 from gaitshift.robot.description import ANYMAL_B
+from gaitshift.robot.motor import Motor
 from synthetic import TABLE, contacts, log_of, turned
 
 TROT = gaits.load("trot")
@@ -99,6 +100,15 @@ def test_saturation_is_the_share_of_joints_and_steps_at_the_motors_limit():
     log = trotting(speed=0.9, period=40, steps=1200, fallen_from=None)
     weak = replace(LIGHT, motor=replace(LIGHT.motor, torque_limit=30.0))
     assert measure(log, {"trot": TROT}, weak)["saturation"] == pytest.approx(1 / 24)
+
+
+def test_windings_are_as_hot_as_the_heat_of_the_busiest_joint_makes_them():
+    """Robot 0 has one joint of twelve at 30 N·m; the other lies. T = R_th · R/K² · τ²."""
+    log = trotting(speed=0.9, period=40, steps=1200, fallen_from=0)
+    motor = Motor(torque_limit=50.0, no_load_speed=20.0, stall_torque=100.0, thermal_resistance=2.0)
+    hot = replace(LIGHT, motor=motor)
+    assert measure(log, {"trot": TROT}, hot)["winding_rise"] == pytest.approx(2.0 * 0.2 * 900.0)
+    assert measure(log, {"trot": TROT}, LIGHT)["winding_rise"] is None
 
 
 def test_a_robot_stalls_whose_machine_waits_for_two_seconds():

@@ -145,6 +145,7 @@ def test_the_robots_joints_have_this_motor_and_its_gains():
         ({"stall_torque": 29.0}, "stall_torque must be at least torque_limit (30 N·m), got 29"),
         ({"friction": -0.1}, "friction must be 0 to 1000, got -0.1"),
         ({"armature": float("inf")}, "armature must be 0 to 100, got inf"),
+        ({"thermal_resistance": -1.0}, "thermal_resistance must be 0 to 1000, got -1"),
     ],
 )
 def test_a_motor_that_cannot_be_is_refused(change, says):

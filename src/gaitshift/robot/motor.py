@@ -38,6 +38,8 @@ class Motor:
     armature: float = 0.0
     """Inertia of the rotor times the gear ratio squared, in addition to that of the robot's model
     [kg·m²]."""
+    thermal_resistance: float = 0.0
+    """From the windings to the air [K/W]; 0: unknown."""
 
     def __post_init__(self) -> None:
         # Ours: far beyond any robot that walks.
@@ -48,6 +50,7 @@ class Motor:
             stall_torque=(0.01, 100_000.0),
             friction=(0.0, 1000.0),
             armature=(0.0, 100.0),
+            thermal_resistance=(0.0, 1000.0),
         )
         if self.stall_torque < self.torque_limit:
             raise GaitshiftError(
@@ -96,6 +99,16 @@ class Motor:
         store it.
         """
         return np.maximum(torque * speed + self.heat * torque * torque, 0.0).sum(axis=-1)
+
+    def winding_rise(self, torque: Float[np.ndarray, "*batch 12"]) -> float | None:
+        """Temperature of the hottest windings over that of the air, in the long run [K].
+
+        It is that at which the mean heat of these torques [N·m] flows off; None: not known.
+        """
+        if self.thermal_resistance == 0:
+            return None
+        heat = self.heat * np.square(torque).reshape(-1, torque.shape[-1]).mean(axis=0, dtype=float)
+        return float(self.thermal_resistance * heat.max())
 
     def drive(self, actuator: "mujoco.MjsActuator", *, kp: float, kd: float) -> None:
         """Makes an actuator of a model this motor, with a position controller.

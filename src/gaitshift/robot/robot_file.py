@@ -1,7 +1,7 @@
 """A user's robot: its numbers from a TOML file, checked together with its model."""
 
 import warnings
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,7 +18,7 @@ from gaitshift.robot.motor import Motor
 
 _NUMBERS = ("foot_radius", "action_scale")
 _KEYS = ("name", "model", "stance", *_NUMBERS, "motor", "gains")
-_MOTOR = ("torque_limit", "no_load_speed", "stall_torque", "friction", "armature")
+_MOTOR = tuple(field.name for field in fields(Motor))
 
 _LEVEL = 0.05
 """Largest difference of foot heights in a stance [m]; ours."""
@@ -105,6 +105,7 @@ def _motor(data: object) -> Motor:
             stall_torque=table.number("stall_torque", default=limit),
             friction=table.number("friction", default=0.0),
             armature=table.number("armature", default=0.0),
+            thermal_resistance=table.number("thermal_resistance", default=0.0),
         )
 
 

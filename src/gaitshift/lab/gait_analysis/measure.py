@@ -51,6 +51,7 @@ def base_figures(sample: Sample, robot: Robot) -> dict[str, Figure]:
         float(turn[:, 1].std(dtype=float)),
         float(too_fast.mean()),
         float(robot.motor.is_saturated(torque, joint_speed).mean()),
+        robot.motor.winding_rise(torque),
         float(log.truth.velocity_b[..., 1][alive].mean(dtype=float)),
         float(sensed.need("angular_velocity_b", "gait figures")[..., 2][alive].mean(dtype=float)),
         float(height.mean(dtype=float)) - robot.stance_height,
@@ -72,6 +73,7 @@ _NAMES = (
     "pitch_rate_sd",
     "overspeed",
     "saturation",
+    "winding_rise",
     "lateral_speed_mean",
     "yaw_rate_mean",
     "height_mean",
@@ -242,6 +244,8 @@ def measure(
     - `roll_rate_sd`, `pitch_rate_sd` [rad/s]: spread of the body's angular velocity about x and y.
     - `overspeed`: share of steps in which a joint is faster than its motor without load.
     - `saturation`: share of joints and steps in which a motor gives all its torque.
+    - `winding_rise` [K]: temperature of the hottest joint's windings over the air in the long run,
+      where the robot's description has a thermal resistance.
     - `lateral_speed_mean` [m/s], `yaw_rate_mean` [rad/s]: mean velocity along body y, and mean
       angular velocity about body z.
     - `height_mean` [m]: mean height of the base over the lowest foot, from that of the stance.
