@@ -2,9 +2,10 @@
 
 Usage: python tools/deployable_evidence.py [--page] [PART...]
 
-Parts are grounds, clean, shifts, ranges, stand and bodies; all by default, which takes an hour on
-two idle cores. Each outcome is a row of deployable.csv, or of deployable_shifts.csv, beside the
-page, and rows that are there are not made again. `--page` runs nothing and writes the page.
+Parts are grounds, edges, mujoco, pybullet, clean, shifts, false, ranges, stand and bodies; all by
+default, which takes two hours on two idle cores. Each outcome is a row of deployable.csv, or of
+deployable_shifts.csv or deployable_false_shifts.csv, beside the page, and rows that are there are
+not made again. `--page` runs nothing and writes the page.
 """
 
 import argparse
@@ -21,13 +22,18 @@ from gaitshift.control import Controller, Driver, policy
 from gaitshift.control.policy import Policy
 from gaitshift.gait import gaits
 from gaitshift.lab.evaluation import DemoConfig, EvaluationConfig, evaluate, run_demo
+from gaitshift.lab.evaluation.courses import COURSES, run_course
 from gaitshift.lab.gait_analysis import FIRST_GAITS
+from gaitshift.lab.identification import poisson
 from gaitshift.robot.description import Robot
+from gaitshift.shift import load_graph
 from gaitshift.sim.sensor_config import ANYMAL, PERFECT
+from gaitshift.sim.simulator import SIMULATORS
 
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
 PAGE, ROWS = RESULTS / "deployable.md", RESULTS / "deployable.csv"
 SHIFTS = RESULTS / "deployable_shifts.csv"
+FALSE_SHIFTS = RESULTS / "deployable_false_shifts.csv"
 TRANSITIONS = RESULTS / "deployable_transitions.csv"
 """The table of `gaitshift transitions`."""
 CROSSINGS, NOISE_AT, NOISE_UNTIL = 64, 8.0, 20.0
@@ -44,6 +50,16 @@ GROUNDS = {
     "slope:-10": ("slope:-10", 0.0, 0.99),
 }
 """Terrain, largest push [N], and least survival that is wanted."""
+
+EDGES = {"stairs of 5 cm": "stairs:0.05", "steps of 10 cm": "steps:0.10"}
+"""Grounds on which no goal is set."""
+
+SECOND = {"flat": ("flat", 0.0)} | {
+    case: (terrain, push) for case, (terrain, push, _) in GROUNDS.items()
+}
+"""Grounds of the second simulator: terrain, and largest push [N]."""
+SAME_SPEED = 0.02
+"""Largest difference of the speeds in the two simulators [m/s]."""
 
 LOOSE = ("gallop", "half_bound", "three_one")
 """Gaits that may miss their speed by 0.1 m/s; the others by 0.05."""
@@ -79,6 +95,20 @@ sensors, which it never had in training; and a bound on soft ground and at frict
 
 {grounds}
 
+## Edges
+
+{few} robots for 20 s, without a goal: survival, and mean speed [m/s].
+
+{edges}
+
+## A second simulator
+
+{few} robots for 10 s in [PyBullet](second-simulator.md), with the same sensors: survival, speed
+[m/s] and mechanical cost of transport in MuJoCo / PyBullet. **Bold**: a robot falls, or the speeds
+differ by more than {same:g} m/s.
+
+{simulators}
+
 ## Clean gaits
 
 {many} robots for 12 s on flat ground, at each gait's own speed.
@@ -88,6 +118,8 @@ sensors, which it never had in training; and a bound on soft ground and at frict
 ## Shifts
 
 {shifts}
+
+{false}
 
 Instant shifts at random phases of the stride ([how they are judged](shifting/instant-shifts.md)):
 
@@ -173,6 +205,9 @@ def trials() -> Iterator[Trial]:
     walking = [gait for gait in kinds() if not gaits.load(gait).stands]
     for gait in (gait for gait in walking if gait in FIRST_GAITS):
         yield from (Trial(part="grounds", gait=gait, case=case) for case in GROUNDS)
+    for part, grounds in (("edges", EDGES), ("mujoco", SECOND), ("pybullet", SECOND)):
+        for gait in (gait for gait in walking if gait in FIRST_GAITS):
+            yield from (Trial(part=part, gait=gait, case=case) for case in grounds)
     for gait in walking:
         yield from (Trial(part="clean", gait=gait, case=case) for case in ("anymal", "perfect"))
     for gait in walking:
@@ -214,6 +249,12 @@ def _config(trial: Trial) -> EvaluationConfig:
     if trial.part == "grounds":
         terrain, push, _ = GROUNDS[trial.case]
         return replace(common, terrain=terrain, push=push, seconds=20.0)
+    if trial.part == "edges":
+        return replace(common, terrain=EDGES[trial.case], episodes=FEW, seconds=20.0)
+    if trial.part in SIMULATORS:
+        terrain, push = SECOND[trial.case]
+        second = replace(common, terrain=terrain, push=push, episodes=FEW, seconds=10.0)
+        return replace(second, simulator=trial.part)
     if trial.part == "clean":
         return replace(common, sensors=ANYMAL if trial.case == "anymal" else PERFECT)
     long = replace(common, episodes=FEW, seconds=60.0)
@@ -265,9 +306,13 @@ def page() -> str:
         seed=SEED,
         many=MANY,
         few=FEW,
+        same=SAME_SPEED,
         grounds=_grounds(cells),
+        edges=_edges(cells),
+        simulators=_simulators(cells),
         clean=_clean(cells),
         shifts=_shifts(),
+        false=_false_shifts(),
         transitions=_transitions(),
         ranges=_ranges(cells),
         stand=_stand(cells),
@@ -281,6 +326,8 @@ def _judged(cells: Cells) -> Iterator[tuple[str, bool]]:
         name = f"{gait}, {case}"
         if part == "grounds":
             yield name, _number(row, "survival") >= GROUNDS[case][2]
+        elif part == "pybullet":
+            yield f"{gait}, {case}, in PyBullet", _is_same(cells["mujoco", gait, case], row)
         elif part == "clean":
             yield f"{gait}, clean with sensors {case}", row["clean"] == "True"
         elif part == "ranges":
@@ -347,6 +394,45 @@ def _grounds(cells: Cells) -> str:
     return table.markdown(head, lines)
 
 
+def _edges(cells: Cells) -> str:
+    lines = [
+        (
+            case,
+            *(
+                f"{_number(row, 'survival'):.2f}, {_number(row, 'speed_mean'):.2f}" if row else ""
+                for row in (cells.get(("edges", gait, case)) for gait in _shown())
+            ),
+        )
+        for case in EDGES
+    ]
+    return table.markdown(("ground", *_shown()), lines)
+
+
+def _is_same(one: dict[str, str], other: dict[str, str]) -> bool:
+    """Whether no robot falls in either simulator, and the speeds are the same."""
+    falls = min(_number(one, "survival"), _number(other, "survival")) < 1
+    return not falls and abs(_number(one, "speed_mean") - _number(other, "speed_mean")) <= (
+        SAME_SPEED
+    )
+
+
+def _simulators(cells: Cells) -> str:
+    figures = ("survival", "speed_mean", "cost_of_transport")
+    lines: list[tuple[str, ...]] = []
+    for case in SECOND:
+        texts: list[str] = []
+        for gait in _shown():
+            pair = [cells.get((name, gait, case)) for name in ("mujoco", "pybullet")]
+            if None in pair:
+                texts.append("")
+                continue
+            one, other = pair[0] or {}, pair[1] or {}
+            text = ", ".join(f"{_number(one, f):.2f} / {_number(other, f):.2f}" for f in figures)
+            texts.append(text if _is_same(one, other) else f"**{text}**")
+        lines.append((case, *texts))
+    return table.markdown(("ground", *_shown()), lines)
+
+
 def _clean(cells: Cells) -> str:
     head = ("gait", "verdict", "speed [m/s]", "with perfect sensors", "CoT", "electrical CoT")
     lines = [
@@ -404,6 +490,54 @@ def _shifts() -> str:
         f"before the noise. It is noticed after {np.mean(ways):.2f} m, the latest after "
         f"{max(ways):.2f} m, and its end after {np.mean(homes):.2f} m."
     )
+
+
+def smooth() -> None:
+    """The graph watches robots that trot on smooth courses; writes a row of each course."""
+    graph = load_graph("sensors")
+    lines: list[table.Row] = []
+    for course in (one for one in COURSES if "perlin" not in one.terrain):
+        driver = Driver.load(["deployable/trot"], FEW)
+        log = run_course(driver, course, seconds=20.0, seed=SEED, sensors=ANYMAL)
+        state, count, robots = graph.begin(FEW), 0, set[int]()
+        for step in range(len(log.time)):
+            before = state.gait
+            state, decision = graph.step(state, log.sensed[step])
+            false = decision.fired & (before == 0) & ~log.fallen[step]
+            count += int(false.sum())
+            robots |= set(np.flatnonzero(false).tolist())
+        x = np.where(log.fallen, np.nan, log.truth.base_position_w[..., 0])
+        way = float((np.nanmax(x, axis=0) - x[0]).sum())
+        row = {"course": course.name, "robots": FEW, "way_km": f"{way / 1000:.3f}"}
+        lines.append({**row, "false_shifts": count, "robots_that_shift": len(robots)})
+        print(lines[-1], flush=True)
+    table.write(FALSE_SHIFTS, lines)
+
+
+def _false_shifts() -> str:
+    """The smooth courses in two sentences and a table."""
+    if not FALSE_SHIFTS.exists():
+        return ""
+    there = table.read(FALSE_SHIFTS)
+    way = sum(float(row["way_km"]) for row in there)
+    count = sum(int(row["false_shifts"]) for row in there)
+    high = float(poisson(np.array([float(count)]), np.array([way]))[1][0])
+    text = (
+        f"On the smooth courses of [identification](../design.md#identification) the graph takes smooth ground for rough "
+        f"{count} times in {way:.1f} km of robots that trot, at most {10 * high:.1f} in 10 km "
+        "with 97.5 % confidence:"
+    )
+    head = ("course", "way [km]", "false shifts", "robots that shift")
+    lines = [
+        (
+            row["course"],
+            row["way_km"],
+            row["false_shifts"],
+            f"{row['robots_that_shift']} of {row['robots']}",
+        )
+        for row in there
+    ]
+    return f"{text}\n\n{table.markdown(head, lines)}"
 
 
 def _transitions() -> str:
@@ -483,6 +617,9 @@ def main() -> None:
     wanted = not options.parts or "shifts" in options.parts
     if wanted and not options.page and not SHIFTS.exists():
         cross()
+    wanted = not options.parts or "false" in options.parts
+    if wanted and not options.page and not FALSE_SHIFTS.exists():
+        smooth()
     table.write(ROWS, [dict(row) for row in rows().values()])  # in the form of a whole table
     PAGE.write_text(page(), encoding="utf-8")
 
