@@ -523,9 +523,9 @@ def _false_shifts() -> str:
     count = sum(int(row["false_shifts"]) for row in there)
     high = float(poisson(np.array([float(count)]), np.array([way]))[1][0])
     text = (
-        f"On the smooth courses of [identification](../design.md#identification) the graph takes smooth ground for rough "
-        f"{count} times in {way:.1f} km of robots that trot, at most {10 * high:.1f} in 10 km "
-        "with 97.5 % confidence:"
+        "On the smooth courses of [identification](../design.md#identification) the graph takes "
+        f"smooth ground for rough {count} times while robots trot {way:.1f} km, at most "
+        f"{10 * high:.1f} times in 10 km with 97.5 % confidence:"
     )
     head = ("course", "way [km]", "false shifts", "robots that shift")
     lines = [
