@@ -51,8 +51,11 @@ GROUNDS = {
 }
 """Terrain, largest push [N], and least survival that is wanted."""
 
-EDGES = {"stairs of 5 cm": "stairs:0.05", "steps of 10 cm": "steps:0.10"}
-"""Grounds on which no goal is set."""
+EDGES = {
+    "stairs of 5 cm": "flat@4," + ",".join(["stairs:0.05@9"] * 4),
+    "steps of 10 cm": "flat@4," + ",".join(["step:0.10@6"] * 6),
+}
+"""Grounds of the standard trials on which no goal is set here."""
 
 SECOND = {"flat": ("flat", 0.0)} | {
     case: (terrain, push) for case, (terrain, push, _) in GROUNDS.items()
