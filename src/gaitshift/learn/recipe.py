@@ -109,6 +109,9 @@ class Stage:
     on level ground 10 cm is enough."""
     kl_factor: float = 1.0
     """Factor on PPO's `desired_kl`; ours: on rough ground larger updates learn more."""
+    entropy_factor: float = 1.0
+    """Factor on PPO's `entropy`; ours: robots whose actions are random walk more slowly, so a
+    policy that learns with large noise is too fast without it."""
     horizon_factor: float = 1.0
     """Factor on PPO's horizon, 1 / (1 - γ) steps; ours: a robot falls 1 to 3 s after a foot catches
     on an edge, and a horizon of 1 s is too short to learn from that."""
@@ -145,6 +148,7 @@ class Stage:
             mixed_starts=(0.0, 1.0),
             swing_factor=(0.01, 100.0),
             kl_factor=(0.001, 1000.0),
+            entropy_factor=(0.0, 1000.0),
             horizon_factor=(0.001, 1000.0),
             trace_factor=(0.001, 1000.0),
             settle=(0.0, 1.0),

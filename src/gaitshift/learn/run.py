@@ -198,7 +198,7 @@ class Run:
         settling = self.recipe.settling(self.iteration)
         self.learner.aim(
             desired_kl=stage.kl_factor * settling,
-            entropy=settling,
+            entropy=stage.entropy_factor * settling,
             horizon=stage.horizon_factor,
             trace=stage.trace_factor,
         )
