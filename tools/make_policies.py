@@ -1,4 +1,4 @@
-"""Trains the shipped policies anew, each by the preset and seed that its record names.
+"""Trains the shipped policies anew, each by the preset, seed and length that its record names.
 
 Usage: python tools/make_policies.py [GAIT...]
 
@@ -27,7 +27,8 @@ def commands(gait: str) -> tuple[Path, list[str]]:
     folder, gait = RUNS / f"{gait.replace('/', '-')}-{seed}", gait.removeprefix(DEPLOYABLE)
     if (folder / "config.json").is_file():
         return folder, ["train", "--resume", str(folder)]
-    asked = ["train", gait, "--preset", preset, "--seed", seed, "--threads", "1"]
+    length = ["--iterations", str(record["iterations"])]
+    asked = ["train", gait, "--preset", preset, "--seed", seed, *length, "--threads", "1"]
     return folder, [*asked, "--out", str(folder)]
 
 
