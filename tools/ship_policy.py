@@ -59,7 +59,8 @@ def ship_deployable(run: Path) -> None:
             entry.value = json.dumps(training)
     folder.mkdir(exist_ok=True)
     onnx.save(model, folder / f"{loaded.gait}.onnx")
-    text = json.dumps({**training, "preset": "deployable"}, indent=1) + "\n"
+    preset = words[words.index("--preset") + 1]
+    text = json.dumps({**training, "preset": preset}, indent=1) + "\n"
     (folder / f"{loaded.gait}.json").write_text(text, encoding="utf-8")
 
 

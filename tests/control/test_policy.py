@@ -266,10 +266,11 @@ def test_a_policy_for_real_sensors_names_the_command_that_trains_it(name):
     assert loaded.gait == name
     assert "base_linear_velocity_b" in loaded.info.observation, "by the estimator"
     command = loaded.info.training["command"]
-    assert command.startswith(f"gaitshift train {name} --preset deployable --seed ")
-    assert "--out" not in command
     record = json.loads(policy.record_file(f"deployable/{name}").read_text(encoding="utf-8"))
     assert record["command"] == command
+    assert record["preset"].startswith("deployable")
+    assert command.startswith(f"gaitshift train {name} --preset {record['preset']} --seed ")
+    assert "--out" not in command
 
 
 # What is refused --------------------------------------------------------------------------------
