@@ -86,6 +86,7 @@ row below meets its goal, but for the touchdowns of the bound (1.2 a cycle) and 
 row names other sensors. An interval is the exact one of 95 % (Clopper and Pearson 1934).
 
 **What holds**: all robots of a trot and a bound stay up on all grounds, and shift there and back.
+In PyBullet all stay up and keep their speed, up a slope of 10° too.
 Beyond the hypothesis these rows miss their goals: the slowest stride of the trot, at which it is
 0.09 m/s too slow; its touchdowns with perfect sensors, which it never had in training; and a bound
 on soft ground and at friction 0.4. Steady turns were two thirds of what was asked, and were made
