@@ -494,10 +494,17 @@ def _shifts() -> str:
 
 
 def smooth() -> None:
-    """The graph watches robots that trot on smooth courses; writes a row of each course."""
+    """The graph watches robots that trot on smooth courses; writes a row of each course.
+
+    Courses with edges are left out: the robots fall there.
+    """
     graph = load_graph("sensors")
-    lines: list[table.Row] = []
-    for course in (one for one in COURSES if "perlin" not in one.terrain):
+    there = table.read(FALSE_SHIFTS, may_be_cut=True) if FALSE_SHIFTS.exists() else []
+    done = {row["course"] for row in there}
+    for course in COURSES:
+        is_smooth = not any(part in course.terrain for part in ("perlin", "step", "stairs"))
+        if course.name in done or not is_smooth:
+            continue
         driver = Driver.load(["deployable/trot"], FEW)
         log = run_course(driver, course, seconds=20.0, seed=SEED, sensors=ANYMAL)
         state, count, robots = graph.begin(FEW), 0, set[int]()
@@ -510,9 +517,9 @@ def smooth() -> None:
         x = np.where(log.fallen, np.nan, log.truth.base_position_w[..., 0])
         way = float((np.nanmax(x, axis=0) - x[0]).sum())
         row = {"course": course.name, "robots": FEW, "way_km": f"{way / 1000:.3f}"}
-        lines.append({**row, "false_shifts": count, "robots_that_shift": len(robots)})
-        print(lines[-1], flush=True)
-    table.write(FALSE_SHIFTS, lines)
+        row |= {"false_shifts": count, "robots_that_shift": len(robots)}
+        table.append(FALSE_SHIFTS, row)
+        print(row, flush=True)
 
 
 def _false_shifts() -> str:
@@ -524,8 +531,8 @@ def _false_shifts() -> str:
     count = sum(int(row["false_shifts"]) for row in there)
     high = float(poisson(np.array([float(count)]), np.array([way]))[1][0])
     text = (
-        "On the smooth courses of [identification](../design.md#identification) the graph takes "
-        f"smooth ground for rough {count} times while robots trot {way:.1f} km, at most "
+        "On the courses of [identification](../design.md#identification) without edges the graph "
+        f"takes smooth ground for rough {count} times while robots trot {way:.1f} km, at most "
         f"{10 * high:.1f} times in 10 km with 97.5 % confidence:"
     )
     head = ("course", "way [km]", "false shifts", "robots that shift")
@@ -619,7 +626,7 @@ def main() -> None:
     if wanted and not options.page and not SHIFTS.exists():
         cross()
     wanted = not options.parts or "false" in options.parts
-    if wanted and not options.page and not FALSE_SHIFTS.exists():
+    if wanted and not options.page:
         smooth()
     made = rows()
     there = [dict(made[trial.key]) for trial in trials() if trial.key in made]
