@@ -159,9 +159,7 @@ class Estimator:
             angular_velocity_b=sensed.need("angular_velocity_b", "the estimator"),
             joint_position=sensed.need("joint_position", "the estimator"),
         )
-        estimated = sensed.having(velocity_b=after.velocity_b)
-        vars(estimated)["rotation"] = sensed.rotation  # which the policy would compute again
-        return after, estimated
+        return after, sensed.having(velocity_b=after.velocity_b)
 
     @cached_property
     def _noise(self) -> Float[np.ndarray, "4 4"]:

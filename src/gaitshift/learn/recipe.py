@@ -110,8 +110,8 @@ class Stage:
     kl_factor: float = 1.0
     """Factor on PPO's `desired_kl`; ours: on rough ground larger updates learn more."""
     entropy_factor: float = 1.0
-    """Factor on PPO's `entropy`; ours: robots whose actions are random walk more slowly, so a
-    policy that learns with large noise is too fast without it."""
+    """Factor on PPO's `entropy`; ours: on rough ground actions become more random with it, and a
+    trot costs more."""
     horizon_factor: float = 1.0
     """Factor on PPO's horizon, 1 / (1 - γ) steps; ours: a robot falls 1 to 3 s after a foot catches
     on an edge, and a horizon of 1 s is too short to learn from that."""

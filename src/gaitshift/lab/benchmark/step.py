@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -35,22 +36,23 @@ def step_times(steps: int = 1000, seed: int = 0) -> dict[str, float]:
     robot = SimulatedRobot(world, gains=driver.gains, watchdog=1.0)
     taken = dict[str, list[float]]()
 
-    def timed(name: str, work: Callable[[], object]) -> None:
+    def timed(name: str, work: Callable[[], Any]) -> Any:
         start = time.perf_counter()
-        work()
+        done = work()
         taken.setdefault(name, []).append(1e3 * (time.perf_counter() - start))
+        return done
 
-    def control(data: bytes, now: float) -> None:
+    def control(data: bytes, now: float) -> bytes | None:
         deployment.receive(data, now)
-        answer = deployment.step(now)
-        if answer is not None:
-            robot.receive(answer, now)
+        return deployment.step(now)
 
     sensed = list[Proprioception]()
     for step in range(WARM_UP + steps):
         now = 0.01 * step
         data = robot.sensors(now)
-        timed("control_step", lambda data=data, now=now: control(data, now))
+        answer = timed("control_step", lambda data=data, now=now: control(data, now))
+        if answer is not None:
+            robot.receive(answer, now)
         timed("physics", lambda now=now: robot.step(now))
         if deployment.last is not None:
             sensed.append(deployment.last.sensed)
@@ -60,5 +62,5 @@ def step_times(steps: int = 1000, seed: int = 0) -> dict[str, float]:
         blind = one.having(velocity_b=None)
         timed("estimator", lambda blind=blind: estimation.see(blind))
         timed("policy", lambda one=one: (driver.see(one, command), driver.act(one, command)))
-        timed("condition", lambda one=one: graph.step(state, one))
+        state, _ = timed("condition", lambda one=one, state=state: graph.step(state, one))
     return {name: median(of[WARM_UP:]) for name, of in taken.items()}

@@ -16,7 +16,8 @@ from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import ACTION_LIMIT, Command
 from gaitshift.robot.description import ANYMAL_B, Robot
-from gaitshift.robot.state import Privileged, Proprioception
+from gaitshift.robot.state import Proprioception
+from gaitshift.sim.env.border import has_left, starting_points
 from gaitshift.sim.env.config import Curriculum, EnvConfig
 from gaitshift.sim.env.episodes import Commander, MixedStart, mix
 from gaitshift.sim.env.privileged import privileged
@@ -153,8 +154,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         terminated = truth.body_contact | truth.diverged
         if self.machine.accepting:
             terminated |= np.isin(step.state, self.machine.accepting)
-        truncated = (self._age >= self.config.episode_steps) | self._left_terrain(truth)
-        truncated &= ~terminated
+        left = has_left(
+            self.world.terrains, self.config.terrain_margin, truth.base_position_w[:, :2]
+        )
+        truncated = ((self._age >= self.config.episode_steps) | left) & ~terminated
         observation = self._next_observation(terminated | truncated, info)
         return observation, reward, terminated, truncated, info
 
@@ -207,7 +210,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         noise = rng.uniform(-config.joint_noise, config.joint_noise, (count, 12))
         self.world.place(
             ids,
-            xy=self._starting_points(count),
+            xy=starting_points(self.world.terrains, config.terrain_margin, count, rng),
             yaw=yaw,
             joint_position=self._stance + noise,
             base_velocity_w=velocity,
@@ -284,26 +287,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         if not self.machine.has_height:
             return None
         return ideal.base_height - (self.robot.stance_height + command.body_height)
-
-    def _starting_points(self, count: int) -> Float[np.ndarray, "K 2"]:
-        if self._is_level:
-            return np.zeros((count, 2))
-        x0, x1, y0, y1 = self.world.terrains[0].extent
-        inset = 2 * self.config.terrain_margin
-        low = (min(x0 + inset, (x0 + x1) / 2), min(y0 + inset, (y0 + y1) / 2))
-        high = (max(x1 - inset, (x0 + x1) / 2), max(y1 - inset, (y0 + y1) / 2))
-        return self._rng.uniform(low, high, (count, 2))
-
-    def _left_terrain(self, truth: Privileged) -> Bool[np.ndarray, " N"]:
-        if self._is_level:
-            return np.zeros(self.num_envs, dtype=bool)
-        inside = self.world.terrains[0].contains
-        return ~inside(truth.base_position_w[:, :2], self.config.terrain_margin)
-
-    @property
-    def _is_level(self) -> bool:
-        """Whether the ground of all robots is level, and so has no border."""
-        return all(terrain.is_flat for terrain in self.world.terrains)
 
     @property
     def _sensed(self) -> Proprioception:
