@@ -362,8 +362,6 @@ def main() -> None:
             row = walked_row(gait, one) if path == GAITS else crossed(one)
             table.append(path, row)
             print(row, flush=True)
-        for path in (GAITS, CONDITION):  # in the form of a whole table
-            table.write(path, [dict(row) for row in rows_of(path)])
     PAGE.write_text(page(), encoding="utf-8")
 
 

@@ -258,8 +258,6 @@ def main() -> None:
                 for row in done.result():
                     table.append(target, row)
                 print(waiting[done], flush=True)
-        for path in (GAITS, SHIFTS):  # in the form of a whole table
-            table.write(path, [dict(row) for row in _rows(path)])
     PAGE.write_text(page(), encoding="utf-8")
 
 

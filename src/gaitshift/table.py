@@ -26,9 +26,6 @@ batches ahead."""
 MOST_BYTES = 256 << 20
 """Size of the largest table that is read whole [bytes]; ours: a million iterations."""
 
-_LINE_END, _GROWING_LINE_END = "\n", "\r\n"
-"""Line ends of tables that are written whole, and of those that grow (RFC 4180)."""
-
 
 # Whole tables ------------------------------------------------------------------------------------
 
@@ -83,7 +80,10 @@ def write(path: Path, rows: Iterable[Row], columns: Collection[str] | None = Non
     if columns is None:
         rows = list(rows)
         columns = tuple(rows[0])
-    _write(path, rows, tuple(columns), _LINE_END)
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        lines = csv.DictWriter(file, tuple(columns), lineterminator="\n")
+        lines.writeheader()
+        lines.writerows(rows)
 
 
 # Tables that grow --------------------------------------------------------------------------------
@@ -96,15 +96,10 @@ def append(path: Path, row: Row) -> None:
     """
     new = not path.exists()
     with path.open("a", newline="", encoding="utf-8") as file:
-        lines = csv.DictWriter(file, row.keys(), lineterminator=_GROWING_LINE_END)
+        lines = csv.DictWriter(file, row.keys(), lineterminator="\n")
         if new:
             lines.writeheader()
         lines.writerow(row)
-
-
-def rewrite(path: Path, rows: Sequence[Row]) -> None:
-    """Writes a growing file atomically."""
-    _write(path, rows, tuple(rows[0]), _GROWING_LINE_END)
 
 
 # Tables larger than memory -----------------------------------------------------------------------
@@ -184,13 +179,6 @@ def _read(path: Path) -> tuple[tuple[str, ...], list[dict[str, str]], bool]:
 
 def _is_whole(row: Mapping[str, str]) -> bool:
     return None not in row and None not in row.values()
-
-
-def _write(path: Path, rows: Iterable[Row], columns: tuple[str, ...], line_end: str) -> None:
-    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
-        lines = csv.DictWriter(file, columns, lineterminator=line_end)
-        lines.writeheader()
-        lines.writerows(rows)
 
 
 def _arrays(path: Path, batch: Any, known: Collection[str]) -> dict[str, np.ndarray]:

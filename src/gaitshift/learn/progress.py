@@ -41,7 +41,7 @@ def trim(path: Path, iteration: int) -> None:
         return
     rows = [row for row in read(path) if int(row["iteration"]) <= iteration]
     if rows:
-        table.rewrite(path, rows)
+        table.write(path, rows)
     else:
         path.unlink()
 
