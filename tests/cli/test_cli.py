@@ -45,6 +45,11 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
             "--iterations must not be given with --resume",
         ),
         (["train", "--resume", "nowhere", "--seed", "0"], "--seed must not be given with --resume"),
+        (
+            ["train", "trot", "--set", "ppo.epochs=3", "--set", "robots=4"],
+            "--set must be given once, with all of its values after it, got 2 times",
+        ),
+        (["demo", "--seed=1", "--seed", "2"], "--seed must be given once"),
         (["evaluate", "canter"], "policy must be one of "),
         (["evaluate", "none.onnx"], "no policy file none.onnx"),
         (["evaluate", "trot", "--terrain", "lava"], "unknown terrain 'lava'"),

@@ -5,6 +5,7 @@ import os
 import select
 import signal
 import sys
+from collections import Counter
 from collections.abc import Generator
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import make_dataclass
@@ -151,6 +152,7 @@ def _parse(arguments: list[str]) -> Command:
     import tyro  # slow to import
 
     named = arguments[0] if arguments else ""
+    _refuse_repeated(arguments)
     said = io.StringIO()
     try:
         with redirect_stderr(said):
@@ -174,6 +176,16 @@ def _parse(arguments: list[str]) -> Command:
         if end.code:
             raise GaitshiftError(_first_part(said.getvalue())) from None
         raise
+
+
+def _refuse_repeated(arguments: list[str]) -> None:
+    """Options that stand twice, of which tyro would take the last and say nothing."""
+    options = (word.split("=")[0].replace("_", "-") for word in arguments if word[:2] == "--")
+    for option, number in Counter(options).items():
+        if number > 1:
+            raise GaitshiftError(
+                f"{option} must be given once, with all of its values after it, got {number} times"
+            )
 
 
 def _command(name: str) -> type[Command]:
