@@ -27,6 +27,15 @@ def test_commands_are_drawn_from_the_gaits_ranges_and_reach_their_ends():
     assert abs(np.corrcoef(speed, stride)[0, 1]) < 0.2, "each is drawn by itself"
 
 
+def test_speeds_are_drawn_beyond_the_ends_by_a_share_of_the_range_but_not_backwards():
+    """The range is 0.4 to 1.5 m/s."""
+    for margin, ends in ((0.2, (0.18, 1.72)), (0.5, (0.0, 2.05))):
+        env = ranged(10, command_share=1.0, speed_margin=margin)
+        speed, _ = draws(env, resets=60)
+        assert (speed.min(), speed.max()) == pytest.approx(ends, abs=0.03)
+        assert env.commands()["speed_range"] == [0.4, 1.5], "which the policy promises"
+
+
 def aside(env, resets=30):
     """Lateral speeds [m/s] and body heights [m] of the first commands of many episodes."""
     places = env.walker.observation.slices

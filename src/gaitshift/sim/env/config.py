@@ -38,6 +38,10 @@ class EnvConfig:
     command_share: float = 0.6
     """Share of the draws of a command that are uniform in the gait's ranges of speed and stride
     frequency, independently; the others are the gait's nominal values. 0: always nominal. Ours."""
+    speed_margin: float = 0.0
+    """How far beyond each end of a gait's range speeds are drawn in training, as a share of the
+    range; ours: a policy answers the ends of what it is trained with by speeds nearer to the
+    middle, and the speed loop needs slower and faster commands to correct that."""
     heading_range: float = 0.8
     """Wanted headings are drawn within ± this of the present line [rad]; 0 leaves the yaw-rate
     command at zero, as in the paper. Ours."""
@@ -64,6 +68,7 @@ class EnvConfig:
             self,
             episode_steps=(1, 1_000_000),
             command_share=(0.0, 1.0),
+            speed_margin=(0.0, 1.0),
             heading_range=(0.0, 3.2),
             height_span=(0.0, MOST_HEIGHT),
             turn_share=(0.0, 1.0),

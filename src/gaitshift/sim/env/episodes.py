@@ -97,7 +97,9 @@ class Commander:
         machine, rng, own = self._machine, self._rng, self._own(len(ids))
         drawn = rng.random((2, len(ids))) < share
         home = own.forward_speed
-        speed = rng.uniform(*machine.speed_range, len(ids))
+        slow, fast = machine.speed_range
+        margin = self._config.speed_margin * (fast - slow)
+        speed = rng.uniform(max(slow - margin, 0.0), fast + margin, len(ids))
         low, high = machine.dwell_range
         dwell = machine.dwell + scale * (rng.uniform(low, high, len(ids)) - machine.dwell)
         strides = np.array([machine.stride(d) for d in np.rint(dwell).astype(int).tolist()])
