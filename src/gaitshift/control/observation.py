@@ -95,6 +95,20 @@ def _column(read: Callable[[_Instant], np.ndarray], sign: int = 1) -> _Slice:
     return _Slice(1, lambda s: read(s)[:, None], ((0,), (sign,)))
 
 
+_COMMANDS: dict[str, Callable[[Command], np.ndarray]] = {
+    "forward_speed_command": lambda command: command.forward_speed,
+    "yaw_rate_command": lambda command: command.yaw_rate,
+    "stride_command": lambda command: STEP_SCALE * command.stride,
+    "lateral_speed_command": lambda command: command.lateral_speed,
+    "body_height_command": lambda command: HEIGHT_SCALE * command.body_height,
+}
+"""Slices that are parts of the command."""
+
+
+def _commanded(name: str, sign: int = 1) -> _Slice:
+    return _column(lambda s: _COMMANDS[name](s.command), sign)
+
+
 def _vector(read: Callable[[_Instant], np.ndarray], *signs: int) -> _Slice:
     return _Slice(len(signs), read, (tuple(range(len(signs))), signs))
 
@@ -108,11 +122,11 @@ _SLICES: dict[str, _Slice] = {
     "base_linear_velocity_b": _vector(lambda s: _sensed(s, "velocity_b"), 1, -1, 1),
     "base_angular_velocity_b": _vector(lambda s: _sensed(s, "angular_velocity_b"), -1, 1, -1),
     "contact": _Slice(4, lambda s: s.sensed.contact, (MIRRORED_LEGS, (1,) * 4)),
-    "forward_speed_command": _column(lambda s: s.command.forward_speed),
-    "yaw_rate_command": _column(lambda s: s.command.yaw_rate, -1),
-    "stride_command": _column(lambda s: STEP_SCALE * s.command.stride),
-    "lateral_speed_command": _column(lambda s: s.command.lateral_speed, -1),
-    "body_height_command": _column(lambda s: HEIGHT_SCALE * s.command.body_height),
+    "forward_speed_command": _commanded("forward_speed_command"),
+    "yaw_rate_command": _commanded("yaw_rate_command", -1),
+    "stride_command": _commanded("stride_command"),
+    "lateral_speed_command": _commanded("lateral_speed_command", -1),
+    "body_height_command": _commanded("body_height_command"),
     "last_action": _Slice(12, lambda s: s.state.last_action, JOINT_MIRROR),
     "touch_height": _Slice(4, _touch_differences, (MIRRORED_LEGS, (1,) * 4)),
 }
@@ -199,6 +213,14 @@ class Observation:
         for part, where in zip(self._parts, self.slices.values(), strict=True):
             observation[:, where] = part.read(instant)
         return observation
+
+    def of_commands(self, command: Command) -> dict[int, Float[np.ndarray, " N"]]:
+        """The entries that are parts of the command, by their places in the vector."""
+        return {
+            where.start: _COMMANDS[name](command)
+            for name, where in self.slices.items()
+            if name in _COMMANDS
+        }
 
     @cached_property
     def stance_angles(self) -> Float[np.ndarray, " 12"]:

@@ -13,6 +13,7 @@ from tensordict import TensorDict
 
 from gaitshift.control.observation import JOINT_MIRROR
 from gaitshift.errors import GaitshiftError
+from gaitshift.learn.normalization import RangeNormalization
 from gaitshift.learn.ppo import Mirror, WholeUpdatePPO
 from gaitshift.learn.recipe import Recipe
 from gaitshift.robot.command import CONTROL_PERIOD
@@ -188,6 +189,9 @@ def _build_ppo(env: GaitEnv, recipe: Recipe, observation: TensorDict) -> PPO:
     with torch.no_grad():  # so the first actions are close to the stance
         cast(torch.nn.Linear, actor.mlp[-1]).weight.mul_(config.output_gain)
     critic = MLPModel(observation, groups, "critic", 1, **network)
+    if config.normalize_observations and config.normalize_commands == "range":
+        for model in (actor, critic):
+            model.obs_normalizer = RangeNormalization(model.obs_dim, env.observed_commands())
     storage = RolloutStorage("rl", env.num_envs, recipe.steps, observation, [12], "cpu")
     is_symmetric = config.mirror and env.machine.mirrored_states() is not None
     mirror = _mirror(env) if is_symmetric else None

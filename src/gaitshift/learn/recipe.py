@@ -44,6 +44,9 @@ class PpoConfig:
     """Rewards are scaled by this inside PPO alone; ours: values near 1 to 100 with b = 200."""
     normalize_observations: bool = True
     """Running mean and variance of the observations in front of both networks."""
+    normalize_commands: Literal["seen", "range"] = "seen"
+    """By which mean and variance commands are normalised: those of all that was seen, or those of
+    their whole ranges (`RangeNormalization`)."""
     mirror: bool = True
     """Every batch is doubled by its mirror image (left and right changed), where the machine is
     symmetric; ours, after Mittal et al. 2024."""

@@ -82,6 +82,20 @@ class Commander:
             "height_range": list(machine.height_range if varied else [machine.height] * 2),
         }
 
+    def ends(self) -> Command:
+        """Two commands, with the lowest and with the highest value of every part."""
+        ranges, config = self.ranges(), self._config
+        turn = config.heading_loop.yaw_rate_limit
+        turns = not self._machine.stands and max(config.heading_range, config.turn_share) > 0
+        side = ranges["lateral_speed"]
+        return Command(
+            forward_speed=np.array(ranges["speed_range"]),
+            stride_frequency=np.array(ranges["stride_frequency_range"]),
+            yaw_rate=turns * np.array([-turn, turn]),
+            lateral_speed=np.array([-side, side]),
+            body_height=np.array(ranges["height_range"]),
+        )
+
     def _own(self, n: int) -> Command:
         """Straight ahead at the config's speed, or the gait's, and the gait's frequency."""
         machine, speed = self._machine, self._config.forward_speed

@@ -301,6 +301,11 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """Nominal value and range of the forward-speed and stride-frequency commands."""
         return self._commander.ranges()
 
+    def observed_commands(self) -> dict[int, tuple[float, float]]:
+        """Ends of the ranges of all parts of the command, by their places in the observation."""
+        ends = self.walker.observation.of_commands(self._commander.ends())
+        return {place: (float(first), float(last)) for place, (first, last) in ends.items()}
+
     def privileged(self) -> Float32[np.ndarray, "N P"]:
         """What only a simulation knows of the robots now (`gaitshift.sim.env.privileged`)."""
         return privileged(self.world.ideal, self.world.truth, self.world.bodies)
