@@ -154,13 +154,21 @@ class Run:
                 self.export()
                 published = time.monotonic()
 
-    def write_policy_at(self, iteration: int, path: Path) -> None:
-        """Writes the policy of a checkpoint; the run itself goes back to that checkpoint.
+    def go_to(self, iteration: int) -> None:
+        """Goes back to the checkpoint of an iteration.
 
         Raises:
             GaitshiftError: the checkpoint is missing or damaged.
         """
         self._load_checkpoint(checkpoint.file_of(self.folder, iteration))
+
+    def write_policy_at(self, iteration: int, path: Path) -> None:
+        """Writes the policy of a checkpoint, to which the run goes back.
+
+        Raises:
+            GaitshiftError: as `go_to`.
+        """
+        self.go_to(iteration)
         self.export(path)
 
     def export(self, path: Path | None = None) -> None:
