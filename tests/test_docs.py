@@ -17,6 +17,12 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "docs" / "index.md", *sorted((ROOT / "docs" / "guide").glob("*.md"))]
 
 
+def shortened(arguments):
+    """The arguments of a training that ends after two iterations."""
+    at = arguments.index("--iterations") if "--iterations" in arguments else len(arguments)
+    return [*arguments[:at], "--iterations", "2", *arguments[at + 2 :]]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monkeypatch, capsys):
@@ -36,7 +42,7 @@ def test_what_a_page_says_in_code_is_run_from_top_to_bottom(page, tmp_path, monk
                 assert line.startswith("$ gaitshift "), line
                 arguments = shlex.split(line)[2:]
                 if arguments[0] == "train":
-                    arguments += ["--iterations", "2"]
+                    arguments = shortened(arguments)
                 main(arguments)
         elif kind:
             pytest.fail(f"a block of {kind} is neither run nor written")
