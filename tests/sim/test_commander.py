@@ -8,7 +8,7 @@ import pytest
 from gaitshift.control.observation import FULL_SLICES
 from gaitshift.gait import gaits
 from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
-from gaitshift.sim.env.episodes import Commander
+from gaitshift.sim.env.commander import Commander
 from hopping import FLAT, HOP, RANGED, arbitrary_actions, commanded, feed, ranged
 
 

@@ -95,18 +95,18 @@ def _column(read: Callable[[_Instant], np.ndarray], sign: int = 1) -> _Slice:
     return _Slice(1, lambda s: read(s)[:, None], ((0,), (sign,)))
 
 
-_COMMANDS: dict[str, Callable[[Command], np.ndarray]] = {
-    "forward_speed_command": lambda command: command.forward_speed,
-    "yaw_rate_command": lambda command: command.yaw_rate,
-    "stride_command": lambda command: STEP_SCALE * command.stride,
-    "lateral_speed_command": lambda command: command.lateral_speed,
-    "body_height_command": lambda command: HEIGHT_SCALE * command.body_height,
+_COMMANDS: dict[str, tuple[Callable[[Command], np.ndarray], int]] = {
+    "forward_speed_command": (lambda command: command.forward_speed, 1),
+    "yaw_rate_command": (lambda command: command.yaw_rate, -1),
+    "stride_command": (lambda command: STEP_SCALE * command.stride, 1),
+    "lateral_speed_command": (lambda command: command.lateral_speed, -1),
+    "body_height_command": (lambda command: HEIGHT_SCALE * command.body_height, 1),
 }
-"""Slices that are parts of the command."""
+"""Slices that are parts of the command, and their signs as seen in a mirror."""
 
 
-def _commanded(name: str, sign: int = 1) -> _Slice:
-    return _column(lambda s: _COMMANDS[name](s.command), sign)
+def _commanded(read: Callable[[Command], np.ndarray], sign: int) -> _Slice:
+    return _column(lambda s: read(s.command), sign)
 
 
 def _vector(read: Callable[[_Instant], np.ndarray], *signs: int) -> _Slice:
@@ -122,11 +122,7 @@ _SLICES: dict[str, _Slice] = {
     "base_linear_velocity_b": _vector(lambda s: _sensed(s, "velocity_b"), 1, -1, 1),
     "base_angular_velocity_b": _vector(lambda s: _sensed(s, "angular_velocity_b"), -1, 1, -1),
     "contact": _Slice(4, lambda s: s.sensed.contact, (MIRRORED_LEGS, (1,) * 4)),
-    "forward_speed_command": _commanded("forward_speed_command"),
-    "yaw_rate_command": _commanded("yaw_rate_command", -1),
-    "stride_command": _commanded("stride_command"),
-    "lateral_speed_command": _commanded("lateral_speed_command", -1),
-    "body_height_command": _commanded("body_height_command"),
+    **{name: _commanded(read, sign) for name, (read, sign) in _COMMANDS.items()},
     "last_action": _Slice(12, lambda s: s.state.last_action, JOINT_MIRROR),
     "touch_height": _Slice(4, _touch_differences, (MIRRORED_LEGS, (1,) * 4)),
 }
@@ -217,7 +213,7 @@ class Observation:
     def of_commands(self, command: Command) -> dict[int, Float[np.ndarray, " N"]]:
         """The entries that are parts of the command, by their places in the vector."""
         return {
-            where.start: _COMMANDS[name](command)
+            where.start: _COMMANDS[name][0](command)
             for name, where in self.slices.items()
             if name in _COMMANDS
         }

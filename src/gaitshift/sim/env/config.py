@@ -116,7 +116,7 @@ class Curriculum:
     """How far the ranges of what differs from robot to robot reach, 0 to 1."""
     mixed_starts: float = 0.0
     """The share of episodes that begin in the midst of a stride that is no gait's
-    (`gaitshift.sim.env.episodes`), of those that begin while others go on, 0 to 1."""
+    (`gaitshift.sim.env.mixed_start`), of those that begin while others go on, 0 to 1."""
 
     def __post_init__(self) -> None:
         for name in (

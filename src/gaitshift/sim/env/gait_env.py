@@ -11,15 +11,16 @@ from gymnasium.vector.utils import batch_space
 from jaxtyping import Bool, Float, Float32, Int
 
 from gaitshift.control.estimator import Estimation
-from gaitshift.control.observation import GaitState, Observation
+from gaitshift.control.observation import Observation
 from gaitshift.control.walker import Walker
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import ACTION_LIMIT, Command
 from gaitshift.robot.description import ANYMAL_B, Robot
 from gaitshift.robot.state import Proprioception
 from gaitshift.sim.env.border import has_left, starting_points
+from gaitshift.sim.env.commander import Commander
 from gaitshift.sim.env.config import Curriculum, EnvConfig
-from gaitshift.sim.env.episodes import Commander, MixedStart, mix
+from gaitshift.sim.env.mixed_start import MixedStart, mix
 from gaitshift.sim.env.privileged import privileged
 from gaitshift.sim.push import Pusher
 from gaitshift.sim.reward import Swings, earned_bonus, walk_reward, with_bonus
@@ -179,6 +180,19 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         """Draws the age of every episode, so that they are truncated at different times."""
         self._age = self._rng.integers(0, self.config.episode_steps, self.num_envs)
 
+    def commands(self) -> dict[str, Any]:
+        """Nominal value and range of the forward-speed and stride-frequency commands."""
+        return self._commander.ranges()
+
+    def observed_commands(self) -> dict[int, tuple[float, float]]:
+        """Ends of the ranges of all parts of the command, by their places in the observation."""
+        ends = self.walker.observation.of_commands(self._commander.ends())
+        return {place: (float(first), float(last)) for place, (first, last) in ends.items()}
+
+    def privileged(self) -> Float32[np.ndarray, "N P"]:
+        """What only a simulation knows of the robots now (`gaitshift.sim.env.privileged`)."""
+        return privileged(self.world.ideal, self.world.truth, self.world.bodies)
+
     def _start(self, rng: np.random.Generator) -> None:
         n = self.num_envs
         self._rng = rng
@@ -222,7 +236,9 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         self._swings.restart(ids)
         self._age[ids] = 0
         if start is not None:
-            self._set_going(moving, start, yaw[np.isin(ids, moving)])
+            start.place(self.world, moving, yaw[np.isin(ids, moving)])
+            going = start.gait_state(self.machine)
+            self._state = self._state.with_robots(moving, going)
         self._commander.restart(ids, yaw, self.curriculum.command_scale)
         self._update_command()
 
@@ -245,30 +261,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             count=len(moving),
             rng=self._rng,
         )
-
-    def _set_going(
-        self, ids: Int[np.ndarray, " M"], start: MixedStart, yaw: Float[np.ndarray, " M"]
-    ) -> None:
-        """Puts robots at their starting points into these states in mid-stride."""
-        turn = yaw - start.yaw
-        c, s, (x, y, z) = np.cos(turn), np.sin(turn), start.base_velocity_w.T
-        self.world.place(
-            ids,
-            xy=self.world.truth.base_position_w[ids, :2],
-            yaw=turn,
-            attitude=start.attitude,
-            joint_position=start.joint_position,
-            joint_velocity=start.joint_velocity,
-            base_velocity_w=np.stack((c * x - s * y, s * x + c * y, z), axis=-1),
-            base_angular_velocity_b=start.base_angular_velocity_b,
-        )
-        going = GaitState(
-            machine_state=self.machine.enter(start.contact),
-            steps_in_state=np.zeros(len(ids), dtype=np.int64),
-            last_action=start.last_action,
-            touch_height=start.touch_height,
-        )
-        self._state = self._state.with_robots(ids, going)
 
     def _in_time(self, command: Command) -> Float[np.ndarray, " N"] | float:
         """Factor on the stance terms, below 1 where a stance has been held for too long."""
@@ -296,19 +288,6 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
     def _update_command(self) -> None:
         scale = self.curriculum.command_scale
         self._commander.update(self._age, self._sensed.yaw, scale)
-
-    def commands(self) -> dict[str, Any]:
-        """Nominal value and range of the forward-speed and stride-frequency commands."""
-        return self._commander.ranges()
-
-    def observed_commands(self) -> dict[int, tuple[float, float]]:
-        """Ends of the ranges of all parts of the command, by their places in the observation."""
-        ends = self.walker.observation.of_commands(self._commander.ends())
-        return {place: (float(first), float(last)) for place, (first, last) in ends.items()}
-
-    def privileged(self) -> Float32[np.ndarray, "N P"]:
-        """What only a simulation knows of the robots now (`gaitshift.sim.env.privileged`)."""
-        return privileged(self.world.ideal, self.world.truth, self.world.bodies)
 
     def _observation(self) -> Observations:
         return self.walker.observe(self._state, self._sensed, self._commander.command)

@@ -1,15 +1,13 @@
-"""What training draws at random for an episode: commands, and starts in mid-stride."""
+"""The commands of robots in training, drawn at random."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
-from gaitshift.control.observation import GaitState
 from gaitshift.gait import RewardMachine
 from gaitshift.robot.command import CONTROL_PERIOD, Command
-from gaitshift.robot.state import Privileged, Proprioception, rotation_of
 from gaitshift.sim.env.config import EnvConfig
 
 
@@ -146,69 +144,3 @@ class Commander:
         asked = getattr(self.command, name).copy()
         asked[ids] = np.where(drawn, home + scale * (rng.uniform(*ends, len(ids)) - home), home)
         self.command = replace(self.command, **{name: asked})
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MixedStart:
-    """State of K robots in mid-stride."""
-
-    joint_position: Float[np.ndarray, "K 12"]
-    """[rad]"""
-    joint_velocity: Float[np.ndarray, "K 12"]
-    """[rad/s]"""
-    attitude: Float[np.ndarray, "K 4"]
-    """Of the base, with its heading (w, x, y, z)."""
-    base_velocity_w: Float[np.ndarray, "K 3"]
-    """[m/s]"""
-    base_angular_velocity_b: Float[np.ndarray, "K 3"]
-    """[rad/s]"""
-    yaw: Float[np.ndarray, " K"]
-    """The heading [rad]."""
-    last_action: Float[np.ndarray, "K 12"]
-    """Of the robots from which the legs are copied."""
-    touch_height: Float[np.ndarray, "K 4"]
-    """Height above the base at which those feet last touched [m]."""
-    contact: Bool[np.ndarray, "K 4"]
-    """Which of those feet are down."""
-
-
-def mix(
-    sensed: Proprioception,
-    truth: Privileged,
-    state: GaitState,
-    *,
-    among: Int[np.ndarray, " M"],
-    count: int,
-    rng: np.random.Generator,
-) -> MixedStart:
-    """Combines the base of one walking robot with each leg of another.
-
-    A gait is a relation between the phases of the four legs. Legs with random phases therefore
-    cover the states after a shift in mid-stride from any other gait.
-
-    Args:
-        sensed: proprioception of all robots at this instant.
-        truth: privileged state at the same instant.
-        state: gait state of all robots.
-        among: robots that may be copied from.
-        count: number of states to make.
-        rng: draws the robots.
-    """
-    base, leg = rng.choice(among, count), rng.choice(among, (count, 4))
-    of_leg = (leg, np.arange(4))
-
-    def legs_of(joints: Float[np.ndarray, "N 12"]) -> Float[np.ndarray, "K 12"]:
-        return joints.reshape(-1, 4, 3)[of_leg].reshape(count, 12)
-
-    attitude = truth.base_quaternion_w[base]
-    return MixedStart(
-        joint_position=legs_of(sensed.need("joint_position", "a mixed start")),
-        joint_velocity=legs_of(sensed.need("joint_velocity", "a mixed start")),
-        attitude=attitude,
-        base_velocity_w=np.einsum("kij,kj->ki", rotation_of(attitude), truth.velocity_b[base]),
-        base_angular_velocity_b=sensed.need("angular_velocity_b", "a mixed start")[base],
-        yaw=sensed.yaw[base],
-        last_action=legs_of(state.last_action),
-        touch_height=state.touch_height[of_leg],
-        contact=sensed.contact[of_leg],
-    )
