@@ -42,9 +42,21 @@ def test_a_robot_that_is_held_up_is_not_asked_to_run():
     assert longer == held
 
 
-def test_the_trim_is_bounded():
-    stubborn = run(lambda asked, time: WANTED - 0.2, 30.0)
-    assert stubborn == pytest.approx(WANTED + SpeedLoop().limit)
+def test_the_trim_is_bounded_and_may_slow_down_by_more():
+    slow = run(lambda asked, time: WANTED - 0.2, 30.0)
+    assert slow == pytest.approx(WANTED + 0.15)
+    fast = run(lambda asked, time: WANTED + 0.2, 30.0)
+    assert fast == pytest.approx(WANTED - 0.3)
+
+
+def test_a_robot_that_answers_half_as_strongly_is_slowed_to_what_is_wanted():
+    """0.74 + asked / 2 = 1.2 at 0.92: it is 0.14 too fast at first, and needs 0.28 less."""
+    asked = run(lambda asked, time: 0.74 + 0.5 * asked, 30.0)
+    assert asked == pytest.approx(WANTED - 0.28, abs=0.002)
+
+
+def test_without_gain_the_speed_is_asked_for_as_it_is():
+    assert run(lambda asked, time: WANTED + 0.2, 10.0, SpeedLoop(gain=0.0)) == WANTED
 
 
 def test_robots_do_not_know_of_each_other():

@@ -153,7 +153,7 @@ def run_controller(
         yaw_rate=config.yaw_rate,
         body_height=config.body_height,
         push=PushConfig(force=config.push),
-        speed_loop=SpeedLoop(limit=0.0) if config.open_loop else SpeedLoop(),
+        speed_loop=SpeedLoop(gain=0.0) if config.open_loop else SpeedLoop(),
         values=values,
     )
     own = float(controller.repertoire.own_command(controller.gait).forward_speed.max())

@@ -34,7 +34,7 @@ class RolloutConfig:
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
     """Keeps robots on their line along x."""
     speed_loop: SpeedLoop = field(default_factory=SpeedLoop)
-    """Keeps their mean speed; `SpeedLoop(limit=0)` asks for the commanded speed as it is."""
+    """Keeps their mean speed; `SpeedLoop(gain=0)` asks for the commanded speed as it is."""
     push: PushConfig = field(default_factory=PushConfig)
     """Disturbances."""
     joint_noise: float = 0.1
