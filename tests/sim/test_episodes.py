@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from gaitshift.gait import RewardMachine
+from gaitshift.gait import RewardMachine, gaits
 from gaitshift.robot.description import ANYMAL_B
-from gaitshift.sim.env import EnvConfig, GaitEnv
+from gaitshift.sim.env import Curriculum, EnvConfig, GaitEnv
 from gaitshift.sim.push import PushConfig
 from gaitshift.sim.terrain import flat, perlin, slope
 from hopping import FLAT, FOLD, arbitrary_actions, hop, keep_steps, run
@@ -294,3 +294,26 @@ def test_without_pushes_a_standing_robot_stays_where_it_stands():
     for _ in range(100):
         env.step(np.zeros((4, 12)))
     assert np.abs(env.world.truth.base_position_w - before)[:, :2].max() < 0.05
+
+
+@pytest.mark.parametrize("cycles", [1.0, 2.5])
+def test_a_robot_that_stands_in_one_state_for_too_long_has_fallen(cycles):
+    """A trot that keeps its stance never lifts a foot: 2.4 Hz, so a cycle has 42 control steps."""
+    trot, still = gaits.load("trot"), np.zeros((2, 12))
+    allowed = int(cycles * trot.stride())
+    env = GaitEnv(trot, FLAT, num_envs=2, config=EnvConfig(stall=cycles, command_share=0.0))
+    env.reset(seed=0)
+    ends = [env.step(still)[2].all() for _ in range(allowed + 1)]
+    assert ends == [False] * allowed + [True]
+    env.curriculum = Curriculum(strictness=0.9)
+    env.reset(seed=0)
+    assert not any(env.step(still)[2].any() for _ in range(allowed + 1)), "not while it explores"
+    never = GaitEnv(trot, FLAT, num_envs=2, config=EnvConfig(command_share=0.0))
+    never.reset(seed=0)
+    assert not any(never.step(still)[2].any() for _ in range(allowed + 1))
+
+
+def test_a_gait_that_stands_may_stand():
+    env = GaitEnv(gaits.load("stand"), FLAT, num_envs=2, config=EnvConfig(stall=0.1))
+    env.reset(seed=0)
+    assert not any(env.step(np.zeros((2, 12)))[2].any() for _ in range(100))

@@ -165,8 +165,8 @@ class SpeedLoop:
     limit: float = 0.15
     """Largest trim upwards [m/s]."""
     slowing: float = 0.3
-    """Largest trim downwards [m/s]; ours: policies that learn on rough ground are up to 0.25 m/s too
-    fast at their slowest speeds, and a lower command is no danger."""
+    """Largest trim downwards [m/s]; ours: policies that learn on rough ground are up to 0.25 m/s
+    too fast at their slowest speeds, and a lower command is no danger."""
 
     def start(self, n: int) -> SpeedState:
         """State of n robots at rest."""

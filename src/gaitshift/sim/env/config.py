@@ -51,6 +51,9 @@ class EnvConfig:
     turn_share: float = 0.0
     """Share of the draws of a command in which the robot has no wanted heading and turns at a yaw
     rate drawn within ± that of `heading_loop` until the next draw; ours."""
+    stall: float = 0.0
+    """Commanded cycles in one state after which an episode ends like a fall, at full strictness; 0:
+    never. Ours: where falls are likely, standing still is the safer way to earn a little."""
     command_interval: int = 300
     """Control steps between two draws of the wanted heading, speed and stride frequency; ours."""
     heading_loop: HeadingLoop = field(default_factory=HeadingLoop)
@@ -72,6 +75,7 @@ class EnvConfig:
             heading_range=(0.0, 3.2),
             height_span=(0.0, MOST_HEIGHT),
             turn_share=(0.0, 1.0),
+            stall=(0.0, 1000.0),
             command_interval=(1, 1_000_000),
             joint_noise=(0.0, 1.0),
             velocity_noise=(0.0, 10.0),

@@ -153,6 +153,8 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             "diverged": truth.diverged,
         }
         terminated = truth.body_contact | truth.diverged
+        if self.config.stall > 0 and asked.strictness == 1 and not self.machine.stands:
+            terminated |= self._state.steps_in_state > self.config.stall * command.stride
         if self.machine.accepting:
             terminated |= np.isin(step.state, self.machine.accepting)
         left = has_left(
