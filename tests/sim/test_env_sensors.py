@@ -65,3 +65,18 @@ def test_the_same_seed_gives_the_same_bits_also_in_a_used_environment(sensors):
     np.testing.assert_array_equal(again, first)
     other, *_ = stepped(sensors, seed=6)
     assert (other != first).any()
+
+
+def test_feet_that_are_down_and_not_felt_move_a_machine_and_earn_nothing():
+    """A walk that stands still: each edge wants one foot up, and none of them ever is."""
+    blind = SensorConfig(contact_missed=0.3, contact_error_time=0.05)
+    walk = GaitEnv(gaits.load("walk"), GROUND, 4, config=EnvConfig(sensors=blind))
+    walk.reset(seed=1)
+    changed, earned = 0, 0.0
+    for step in range(300):
+        *_, info = walk.step(np.zeros((4, 12)))
+        if step > 20:  # they settle from a small fall
+            assert walk.world.truth.foot_contact.all()
+            changed, earned = changed + info["changed"].sum(), earned + info["bonus"].sum()
+    assert changed > 10
+    assert earned == 0.0

@@ -63,7 +63,7 @@ class RewardMachine(Definition):
                 an edge with its own dwell keeps its proportion, rounded up.
         """
         rows = self._lookup
-        suiting = rows.edge[state * LABEL_COUNT + label_of(contact)]
+        suiting = self.suiting(state, contact)
         waited = steps_in_state + 1
         if dwell is None:
             waited_enough = waited >= rows.dwell[suiting]
@@ -77,6 +77,15 @@ class RewardMachine(Definition):
             edge=edge,
             bonus=rows.bonus[edge],
         )
+
+    def suiting(
+        self, state: Int[np.ndarray, " N"], contact: Bool[np.ndarray, "N 4"]
+    ) -> Int[np.ndarray, " N"]:
+        """The edge out of each state whose guard holds for these contacts, whatever its dwell.
+
+        Numbered as `Step.edge`: the number of all edges where none holds.
+        """
+        return self._lookup.edge[state * LABEL_COUNT + label_of(contact)]
 
     def swing_share(
         self, edge: Int[np.ndarray, " N"], swing: Float[np.ndarray, "N 4"]

@@ -134,9 +134,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             action_change=action - before.last_action,
             penalty_scale=asked.penalty_scale,
         )
+        is_real = self.machine.suiting(left, contact) == step.edge
         bonus = earned_bonus(
             self.config.reward,
-            step.bonus,
+            step.bonus * is_real,  # else a walk stands and waits for feet that are not felt
             swing_share=swing_share,
             on_time=on_time,
             strictness=asked.strictness,
