@@ -164,7 +164,7 @@ class SpeedLoop:
     """Largest error of the mean that is corrected [m/s]."""
     limit: float = 0.15
     """Largest trim upwards [m/s]."""
-    slowing: float = 0.3
+    slowing: float = 0.35
     """Largest trim downwards [m/s]; ours: policies that learn on rough ground are up to 0.25 m/s
     too fast at their slowest speeds, and a lower command is no danger."""
 
