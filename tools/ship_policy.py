@@ -1,11 +1,11 @@
 """Ships a trained policy: the network, its curve and its figures go into the package.
 
-Usage: python tools/ship_policy.py [--trials all|short|quick] RUN|GAIT...
+Usage: python tools/ship_policy.py [--trials all|short|quick|none] RUN|GAIT...
        python tools/ship_policy.py --deployable RUN...
 
-A gait by its name is one that is shipped already: its figures are made anew. `make policies` trains
-and ships all. With --deployable a policy for real sensors goes into policies/deployable;
-`tools/deployable_evidence.py` makes its figures.
+A gait by its name is one that is shipped already: its figures are made anew, with "none" those of
+its commands alone. `make policies` trains and ships all. With --deployable a policy for real
+sensors goes into policies/deployable; `tools/deployable_evidence.py` makes its figures.
 """
 
 import argparse
@@ -65,8 +65,13 @@ def ship_deployable(run: Path) -> None:
 
 
 def judge_again(name: str, trials: str) -> None:
-    """Puts a shipped policy through the standard trials."""
+    """Puts a shipped policy through the standard trials, or lets it follow commands alone."""
     loaded = policy.load(name)
+    if trials == "none":
+        record = json.loads(policy.record_file(name).read_text(encoding="utf-8"))
+        record["evaluation"]["commands"] = [asdict(row) for row in follow_commands(loaded)]
+        write_record(name, record)
+        return
     write_record(name, {**loaded.info.training, "evaluation": judged(loaded, trials)})
 
 
@@ -101,7 +106,7 @@ def _rounded(value: object) -> object:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", choices=tuple(SIZES), default="all")
+    parser.add_argument("--trials", choices=(*SIZES, "none"), default="all")
     parser.add_argument("--deployable", action="store_true")
     parser.add_argument("runs", nargs="+", metavar="RUN|GAIT")
     options = parser.parse_args()
@@ -110,6 +115,8 @@ if __name__ == "__main__":
             ship_deployable(Path(run))
         elif run in policy.shipped():
             judge_again(run, options.trials)
+        elif options.trials == "none":
+            parser.error(f"--trials none is for shipped gaits, got '{run}'")
         else:
             ship(Path(run), options.trials)
     if not options.deployable:
