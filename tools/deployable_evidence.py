@@ -27,7 +27,7 @@ from gaitshift.lab.gait_analysis import FIRST_GAITS
 from gaitshift.lab.identification import poisson
 from gaitshift.robot.description import Robot
 from gaitshift.shift import load_graph
-from gaitshift.sim.sensor_config import ANYMAL, PERFECT
+from gaitshift.sim.sensor_config import ANYMAL, CHEAP, PERFECT
 from gaitshift.sim.simulator import SIMULATORS
 
 RESULTS = Path(__file__).parent.parent / "docs" / "results"
@@ -39,6 +39,16 @@ TRANSITIONS = RESULTS / "deployable_transitions.csv"
 CROSSINGS, NOISE_AT, NOISE_UNTIL = 64, 8.0, 20.0
 """Robots that cross the demonstration's track, and where its noise begins and ends [m]."""
 SEED = 20
+
+LINKS = {
+    "anymal": ANYMAL,
+    **{
+        f"anymal, delay {1000 * t:.0f} ms": replace(ANYMAL, delay=(t, t))
+        for t in (0.01, 0.02, 0.03)
+    },
+    "cheap": CHEAP,
+}
+"""Sensors with which robots shift by themselves."""
 
 MANY, FEW = 512, 64
 """Robots of a row: on the grounds and for clean gaits; for ranges, standing and bodies."""
@@ -57,8 +67,14 @@ EDGES = {
 }
 """Grounds of the standard trials on which no goal is set here."""
 
-SECOND, SECOND_ROBOTS = ("flat", "perlin:0.10", "slope:10"), 16
-"""Grounds of the second simulator, which is slow, and robots on each."""
+SECOND = {
+    "flat": ("flat", 0.0),
+    "flat, pushes of 120 N": ("flat", 120.0),
+    "perlin:0.10": ("perlin:0.10", 0.0),
+    "slope:10": ("slope:10", 0.0),
+}
+SECOND_ROBOTS = 16
+"""Terrain and largest push [N] in the second simulator, which is slow; robots of a row."""
 SAME_SPEED = 0.02
 """Largest difference of the speeds in the two simulators [m/s]."""
 
@@ -114,7 +130,7 @@ differ by more than {same:g} m/s.
 
 ## Clean gaits
 
-{many} robots for 12 s on flat ground, at each gait's own speed.
+{many} robots for 12 s on flat ground, at each gait's own speed; with perfect sensors {few}.
 
 {clean}
 
@@ -123,6 +139,10 @@ differ by more than {same:g} m/s.
 {shifts}
 
 {false}
+
+With other sensors and delays, {crossings} crossings and the same courses each:
+
+{links}
 
 Instant shifts at random phases of the stride ([how they are judged](shifting/instant-shifts.md)):
 
@@ -255,10 +275,13 @@ def _config(trial: Trial) -> EvaluationConfig:
     if trial.part == "edges":
         return replace(common, terrain=EDGES[trial.case], episodes=FEW, seconds=20.0)
     if trial.part in SIMULATORS:
-        second = replace(common, terrain=trial.case, episodes=SECOND_ROBOTS, seconds=10.0)
+        terrain, push = SECOND[trial.case]
+        second = replace(common, terrain=terrain, push=push, seconds=10.0)
+        second = replace(second, episodes=SECOND_ROBOTS)
         return replace(second, simulator=trial.part)
     if trial.part == "clean":
-        return replace(common, sensors=ANYMAL if trial.case == "anymal" else PERFECT)
+        perfect = replace(common, sensors=PERFECT, episodes=FEW)
+        return common if trial.case == "anymal" else perfect
     long = replace(common, episodes=FEW, seconds=60.0)
     if trial.part == "ranges":
         return replace(long, **commands_of(trial.gait)[trial.case])
@@ -314,6 +337,8 @@ def page() -> str:
         clean=_clean(cells),
         shifts=_shifts(),
         false=_false_shifts(),
+        crossings=CROSSINGS,
+        links=_links(),
         transitions=_transitions(),
         ranges=_ranges(cells),
         stand=_stand(cells),
@@ -451,62 +476,112 @@ def _clean(cells: Cells) -> str:
     return table.markdown(head, lines)
 
 
-def cross() -> None:
-    """Robots cross the demonstration's track; writes a row of each."""
+def cross(link: str) -> None:
+    """Robots with these sensors cross the demonstration's track; writes a row of each."""
 
     def make(names: Sequence[str], n: int, *, robot: Robot | None = None) -> Controller:
         return Driver.load([f"deployable/{name}" for name in names], n, robot=robot)
 
-    config = DemoConfig(episodes=CROSSINGS, seed=SEED, graph="sensors", sensors=ANYMAL)
+    config = DemoConfig(episodes=CROSSINGS, seed=SEED, graph="sensors", sensors=LINKS[link])
     _, summaries = run_demo(config, make=make)
-    table.write(
-        SHIFTS,
-        [
-            {
-                "seed": SEED + number,
-                "survived": summary["survived"],
-                "finished": summary["finished"],
-                "to": " ".join(shift["to"] for shift in summary["switches"]),
-                "at": " ".join(f"{shift['x_m']:.2f}" for shift in summary["switches"]),
-            }
-            for number, summary in enumerate(summaries)
-        ],
-    )
+    for number, summary in enumerate(summaries):
+        shifts = summary["switches"]
+        row: table.Row = {"sensors": link, "seed": SEED + number}
+        row |= {"survived": summary["survived"], "finished": summary["finished"]}
+        row["to"] = " ".join(shift["to"] for shift in shifts)
+        row["at"] = " ".join(f"{shift['x_m']:.2f}" for shift in shifts)
+        table.append(SHIFTS, row)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Crossings:
+    """What comes of the crossings of robots with the same sensors."""
+
+    n: int
+    fell: int
+    back: int
+    """Robots that shift on the noise and back behind it, and no more."""
+    early: int
+    """Robots that shift before the noise."""
+    way: tuple[float, float]
+    """From the beginning of the noise to the shift, mean and greatest [m]."""
+    home: float
+    """From its end to the shift back, mean [m]."""
+
+    @classmethod
+    def of(cls, there: Sequence[dict[str, str]]) -> "Crossings":
+        """Of the rows of `cross`."""
+        back = [row for row in there if row["to"] == "bound trot" and row["survived"] == "True"]
+        places = [[float(x) for x in row["at"].split()] for row in there]
+        ways = [at[0] - NOISE_AT for at in places if at and at[0] >= NOISE_AT]
+        homes = [float(row["at"].split()[1]) - NOISE_UNTIL for row in back]
+        return cls(
+            n=len(there),
+            fell=sum(row["survived"] != "True" for row in there),
+            back=len(back),
+            early=sum(at[0] < NOISE_AT for at in places if at),
+            way=(float(np.mean(ways)), max(ways)) if ways else (np.nan, np.nan),
+            home=float(np.mean(homes)) if homes else np.nan,
+        )
+
+
+def _crossings() -> dict[str, Crossings]:
+    """By sensors."""
+    there = table.read(SHIFTS, may_be_cut=True) if SHIFTS.exists() else []
+    links = dict.fromkeys(row["sensors"] for row in there)
+    return {link: Crossings.of([r for r in there if r["sensors"] == link]) for link in links}
 
 
 def _shifts() -> str:
-    """The crossings in three sentences."""
-    if not SHIFTS.exists():
+    """The crossings with the preset `anymal` in three sentences."""
+    one = _crossings().get("anymal")
+    if one is None:
         return ""
-    there = table.read(SHIFTS)
-    back = [row for row in there if row["to"] == "bound trot" and row["survived"] == "True"]
-    places = [[float(x) for x in row["at"].split()] for row in there]
-    early = sum(any(x < NOISE_AT for x in at[:1]) for at in places)
-    ways = [at[0] - NOISE_AT for at in places if at and at[0] >= NOISE_AT]
-    homes = [float(row["at"].split()[1]) - NOISE_UNTIL for row in back]
+    mean, most = one.way
     return (
-        f"{len(there)} robots cross the demonstration's track, each on a field of its own, with "
-        f"the graph `sensors`. {len(back)} of {len(there)} shift to the bound on the noise of "
-        f"10 cm and back behind it, without a fall and without another shift; {early} shift "
-        f"before the noise. It is noticed after {np.mean(ways):.2f} m, the latest after "
-        f"{max(ways):.2f} m, and its end after {np.mean(homes):.2f} m."
+        f"{one.n} robots cross the demonstration's track, each on a field of its own, with the "
+        f"graph `sensors`. {one.back} of {one.n} shift to the bound on the noise of 10 cm and back "
+        f"behind it, without a fall and without another shift; {one.early} shift before the "
+        f"noise. It is noticed after {mean:.2f} m, the latest after {most:.2f} m, and its end "
+        f"after {one.home:.2f} m."
     )
 
 
-def smooth() -> None:
+def _links() -> str:
+    """Crossings and smooth courses by sensors."""
+    false = _false_of()
+    lines = []
+    for link, one in _crossings().items():
+        count, way = false.get(link, (0, np.nan))
+        lines.append(
+            (
+                link,
+                f"{one.back} of {one.n}",
+                str(one.early),
+                str(one.fell),
+                f"{one.way[0]:.2f}, {one.way[1]:.2f}",
+                f"{one.home:.2f}",
+                f"{count} in {way:.1f} km",
+            )
+        )
+    head = ("sensors", "there and back", "early", "fell", "noticed after: mean, latest [m]")
+    return table.markdown((*head, "end noticed after [m]", "false shifts"), lines)
+
+
+def smooth(link: str) -> None:
     """The graph watches robots that trot on smooth courses; writes a row of each course.
 
     Courses with edges are left out: the robots fall there.
     """
     graph = load_graph("sensors")
     there = table.read(FALSE_SHIFTS, may_be_cut=True) if FALSE_SHIFTS.exists() else []
-    done = {row["course"] for row in there}
+    done = {(row["sensors"], row["course"]) for row in there}
     for course in COURSES:
         is_smooth = not any(part in course.terrain for part in ("perlin", "step", "stairs"))
-        if course.name in done or not is_smooth:
+        if (link, course.name) in done or not is_smooth:
             continue
         driver = Driver.load(["deployable/trot"], FEW)
-        log = run_course(driver, course, seconds=20.0, seed=SEED, sensors=ANYMAL)
+        log = run_course(driver, course, seconds=20.0, seed=SEED, sensors=LINKS[link])
         state, count, robots = graph.begin(FEW), 0, set[int]()
         for step in range(len(log.time)):
             before = state.gait
@@ -516,19 +591,28 @@ def smooth() -> None:
             robots |= set(np.flatnonzero(false).tolist())
         x = np.where(log.fallen, np.nan, log.truth.base_position_w[..., 0])
         way = float((np.nanmax(x, axis=0) - x[0]).sum())
-        row = {"course": course.name, "robots": FEW, "way_km": f"{way / 1000:.3f}"}
+        row: table.Row = {"sensors": link, "course": course.name, "robots": FEW}
+        row |= {"way_km": f"{way / 1000:.3f}"}
         row |= {"false_shifts": count, "robots_that_shift": len(robots)}
         table.append(FALSE_SHIFTS, row)
         print(row, flush=True)
 
 
+def _false_of() -> dict[str, tuple[int, float]]:
+    """False shifts on the smooth courses, and the way there [km], by sensors."""
+    there = table.read(FALSE_SHIFTS, may_be_cut=True) if FALSE_SHIFTS.exists() else []
+    sums: dict[str, tuple[int, float]] = {}
+    for row in there:
+        count, way = sums.get(row["sensors"], (0, 0.0))
+        sums[row["sensors"]] = (count + int(row["false_shifts"]), way + float(row["way_km"]))
+    return sums
+
+
 def _false_shifts() -> str:
-    """The smooth courses in two sentences and a table."""
-    if not FALSE_SHIFTS.exists():
+    """The smooth courses in two sentences and a table, with the preset `anymal`."""
+    if "anymal" not in _false_of():
         return ""
-    there = table.read(FALSE_SHIFTS)
-    way = sum(float(row["way_km"]) for row in there)
-    count = sum(int(row["false_shifts"]) for row in there)
+    count, way = _false_of()["anymal"]
     high = float(poisson(np.array([float(count)]), np.array([way]))[1][0])
     text = (
         "On the courses of [identification](../design.md#identification) without edges the graph "
@@ -543,7 +627,8 @@ def _false_shifts() -> str:
             row["false_shifts"],
             f"{row['robots_that_shift']} of {row['robots']}",
         )
-        for row in there
+        for row in table.read(FALSE_SHIFTS)
+        if row["sensors"] == "anymal"
     ]
     return f"{text}\n\n{table.markdown(head, lines)}"
 
@@ -622,12 +707,10 @@ def main() -> None:
         row = run(trial)
         table.append(ROWS, row)
         print(row, flush=True)
-    wanted = not options.parts or "shifts" in options.parts
-    if wanted and not options.page and not SHIFTS.exists():
-        cross()
-    wanted = not options.parts or "false" in options.parts
-    if wanted and not options.page:
-        smooth()
+    for part, make in (("shifts", cross), ("false", smooth)):
+        for link in LINKS if not options.parts or part in options.parts else ():
+            if not options.page and not (part == "shifts" and link in _crossings()):
+                make(link)
     made = rows()
     there = [dict(made[trial.key]) for trial in trials() if trial.key in made]
     table.write(ROWS, there)

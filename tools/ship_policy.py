@@ -12,7 +12,7 @@ import argparse
 import json
 import shlex
 import shutil
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,10 @@ from gait_results import PAGE, page
 
 from gaitshift import table
 from gaitshift.control import policy
+from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation import SIZES, follow_commands, run_trials
+from gaitshift.learn.presets import PRESETS
+from gaitshift.learn.run_config import RunConfig
 from gaitshift.show.plots import hildebrand_diagram, training_curves
 
 POLICIES = Path(policy.__file__).parent / "policies"
@@ -47,7 +50,11 @@ def ship(run: Path, trials: str) -> None:
 
 
 def ship_deployable(run: Path) -> None:
-    """Copies the policy of `run` and its record, which names no folder of this machine."""
+    """Copies the policy of `run` and its record, which names no folder of this machine.
+
+    Raises:
+        GaitshiftError: the run has another recipe than its preset has now.
+    """
     folder = POLICIES / "deployable"
     loaded = policy.load(run / "policy.onnx")
     words = shlex.split(loaded.info.training["command"])
@@ -57,9 +64,13 @@ def ship_deployable(run: Path) -> None:
     for entry in model.metadata_props:
         if entry.key == "gaitshift.training":
             entry.value = json.dumps(training)
+    preset = words[words.index("--preset") + 1]
+    recipe = RunConfig.read(run).recipe
+    threads = {"threads": recipe.threads, "physics_threads": recipe.physics_threads}
+    if recipe != replace(PRESETS[preset](), **threads):
+        raise GaitshiftError(f"{run} has another recipe than preset {preset}")
     folder.mkdir(exist_ok=True)
     onnx.save(model, folder / f"{loaded.gait}.onnx")
-    preset = words[words.index("--preset") + 1]
     text = json.dumps({**training, "preset": preset}, indent=1) + "\n"
     (folder / f"{loaded.gait}.json").write_text(text, encoding="utf-8")
 

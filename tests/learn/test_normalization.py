@@ -42,7 +42,8 @@ def test_an_entry_without_a_range_is_0_behind_the_normalisation():
 def learner(normalize_commands):
     preset = PRESETS["deployable"]()
     ppo = replace(preset.ppo, normalize_commands=normalize_commands)
-    recipe = replace(preset, ppo=ppo, robots=4, steps=8, threads=1)
+    env = replace(preset.env, speed_margin=0.0)
+    recipe = replace(preset, env=env, ppo=ppo, robots=4, steps=8, threads=1)
     torch.manual_seed(0)
     return Learner(GaitEnv(TROT, flat(20.0, 20.0), 4, config=recipe.env, threads=1), recipe)
 

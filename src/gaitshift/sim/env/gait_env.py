@@ -188,7 +188,10 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
         return self._commander.ranges()
 
     def observed_commands(self) -> dict[int, tuple[float, float]]:
-        """Ends of the ranges of all parts of the command, by their places in the observation."""
+        """Ends of the ranges of all parts of the command, by their places in the observation.
+
+        `speed_margin` does not widen them.
+        """
         ends = self.walker.observation.of_commands(self._commander.ends())
         return {place: (float(first), float(last)) for place, (first, last) in ends.items()}
 
