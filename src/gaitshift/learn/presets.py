@@ -64,11 +64,11 @@ def deployable() -> Recipe:
     rough = Stage(
         name="rough",
         iterations=350,
-        amplitude=0.08,
+        amplitude=0.13,
         slope=12.0,
         push=130.0,
         swing_factor=1.1,
-        fields=shared_out(flat=7, perlin=3, slope=2),
+        fields=shared_out(flat=6, perlin=4, slope=2),
         settle=0.9,
         averaged=0.4,
     )
