@@ -18,6 +18,7 @@ from gaitshift.errors import GaitshiftError
 from gaitshift.gait import RewardMachine, gaits
 from gaitshift.learn.export import describe, export, write
 from gaitshift.learn.learner import Learner, as_tensors
+from gaitshift.learn.presets import PRESETS
 from gaitshift.learn.recipe import PpoConfig, Recipe
 from gaitshift.sim.env import EnvConfig, GaitEnv
 from gaitshift.sim.terrain import flat
@@ -268,7 +269,8 @@ def test_a_policy_for_real_sensors_names_the_command_that_trains_it(name):
     command = loaded.info.training["command"]
     record = json.loads(policy.record_file(f"deployable/{name}").read_text(encoding="utf-8"))
     assert record["command"] == command
-    assert record["preset"].startswith("deployable")
+    assert record["preset"] == "deployable"
+    assert record["iterations"] == PRESETS["deployable"]().iterations, "the preset as it is now"
     assert command.startswith(f"gaitshift train {name} --preset {record['preset']} --seed ")
     assert "--out" not in command
 
