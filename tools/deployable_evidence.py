@@ -93,8 +93,8 @@ deployable/trot --sensors anymal` runs one. A robot that shifts by itself:
 $ gaitshift demo --policy-files deployable/trot deployable/bound --graph sensors --sensors anymal
 ```
 
-They are not the default yet. There are no edges in their training, and robots that meet stairs of
-5 cm fall. [How the recipe came about](training-recipe.md#real-sensors-and-robots-that-differ) is a
+They are not the default yet. There are no edges in their training, and trot and bound fall on
+stairs of 5 cm. [How the recipe came about](training-recipe.md#real-sensors-and-robots-that-differ) is a
 page of its own. By the same recipe half-bound and gallop are not clean and not shipped; pronk and
 three-one are not tried.
 
@@ -103,6 +103,13 @@ below meets its goal but for these: the pace at 0.4 and 1.6 m/s and with its slo
 bound at 1.6 m/s and with its slowest stride, and the turns of the walk.
 **Seeds**: {seed} and above, which chose nothing. All robots have the preset `anymal`, but where a
 row names other sensors. An interval is the exact one of 95 % (Clopper and Pearson 1934).
+
+**What comes of it**: the trot meets every goal on its grounds, speeds, strides, turns, bodies and
+delays, and the walk keeps its speeds and strides. All robots shift there and back. Pace, bound and
+walk miss what the hypothesis says they miss. Not in the hypothesis: the bound falls on noise of
+10 cm, 7 of 512, and at friction 0.25, 2 of 64; the pace is slow with 30 ms of delay and with much
+damping; bodies do not rise by 3 cm; a pace in PyBullet, and a trot up a slope there, is faster than
+in MuJoCo by 0.03 to 0.04 m/s.
 
 ## Grounds
 
