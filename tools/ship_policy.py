@@ -58,17 +58,17 @@ def ship_deployable(run: Path) -> None:
     folder = POLICIES / "deployable"
     loaded = policy.load(run / "policy.onnx")
     words = shlex.split(loaded.info.training["command"])
+    preset = words[words.index("--preset") + 1]
+    recipe = RunConfig.read(run).recipe
+    threads = {"threads": recipe.threads, "physics_threads": recipe.physics_threads}
+    if recipe != replace(PRESETS[preset](), **threads):
+        raise GaitshiftError(f"{run} has another recipe than preset {preset}")
     at = words.index("--out") if "--out" in words else len(words)
     training = {**loaded.info.training, "command": shlex.join(words[:at] + words[at + 2 :])}
     model = onnx.load(run / "policy.onnx")
     for entry in model.metadata_props:
         if entry.key == "gaitshift.training":
             entry.value = json.dumps(training)
-    preset = words[words.index("--preset") + 1]
-    recipe = RunConfig.read(run).recipe
-    threads = {"threads": recipe.threads, "physics_threads": recipe.physics_threads}
-    if recipe != replace(PRESETS[preset](), **threads):
-        raise GaitshiftError(f"{run} has another recipe than preset {preset}")
     folder.mkdir(exist_ok=True)
     onnx.save(model, folder / f"{loaded.gait}.onnx")
     text = json.dumps({**training, "preset": preset}, indent=1) + "\n"
