@@ -54,6 +54,24 @@ def opened(browser, address, *, draws=True, **context):
     return page, wrong
 
 
+def click(locator):
+    """Clicks on it as soon as it can be clicked.
+
+    Playwright waits for two frames in which it stands still. Beside busy neighbours Chromium
+    sometimes loses the one that is asked for, and the wait never ends: then it asks again.
+    """
+    from playwright.sync_api import TimeoutError as TooLate  # may not be installed
+
+    def clicked():
+        try:
+            locator.click(timeout=1000 * PATIENCE / 10)
+        except TooLate:
+            return False
+        return True
+
+    wait_until(clicked)
+
+
 def keep(page, name):
     """A screenshot for whoever looks at what a test run leaves: out/screens/NAME.png.
 

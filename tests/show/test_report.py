@@ -193,19 +193,21 @@ def test_the_page_opens_without_a_network_and_its_slider_moves_the_robot(log, pa
     slider.fill("4")
     np.testing.assert_allclose(position()[0], log.truth.base_position_w[400, 1, 0], atol=0.03)
     assert opened.locator("#clock").inner_text() == "4.00 s"
-    opened.locator("#play").click()
+    browsing.click(opened.locator("#play"))
     opened.wait_for_function("gaitshift.state.time > 4.3")
-    opened.locator("#play").click()
+    browsing.click(opened.locator("#play"))
     stopped = opened.evaluate("gaitshift.state.time")
     time.sleep(0.5)
     assert opened.evaluate("gaitshift.state.time") == stopped
-    opened.locator("h2", has_text="Shifts").locator("xpath=following::tr[@data-seek][1]").click()
+    browsing.click(
+        opened.locator("h2", has_text="Shifts").locator("xpath=following::tr[@data-seek][1]")
+    )
     shift = json.loads(page.read_text().split("data-walk>")[1].split("</script>")[0])["shifts"][0]
     assert opened.evaluate("gaitshift.state.time") == pytest.approx(shift - 1.0, abs=0.02)
     opened.locator("#charts canvas").click(position={"x": 500, "y": 60})
     assert opened.evaluate("gaitshift.state.time") != pytest.approx(shift - 1.0, abs=0.02)
     opened.locator("#scene").scroll_into_view_if_needed()
     browsing.wait_for_robot(opened, "report", rows=3 / 4)
-    opened.locator("#theme").click()
+    browsing.click(opened.locator("#theme"))
     assert opened.evaluate("getComputedStyle(document.documentElement).colorScheme") == "dark"
     assert not wrong

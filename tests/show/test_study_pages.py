@@ -192,7 +192,7 @@ def test_the_pointer_reads_the_figures_without_a_network(identified, shifted, br
     assert zoomed > 1, "the left border is no longer where β is least"
     canvas.dblclick(position={"x": 75, "y": 200})
     assert float(re.search(r"β ([\d.]+)", note.inner_text())[1]) == 0
-    opened.locator("#theme").click()
+    browsing.click(opened.locator("#theme"))
     assert opened.evaluate("getComputedStyle(document.documentElement).colorScheme") == "dark"
     assert browsing.keep(opened, "identify").std() > 20
     assert not wrong

@@ -136,7 +136,7 @@ def test_the_live_page_shows_a_robot_that_walks_and_obeys(served, browser):
     first = status(page)
     assert first[0] == "trot"
     wait_until(lambda: status(page)[1] > first[1] + 1.0)
-    page.get_by_role("button", name="pace", exact=True).click()
+    browsing.click(page.get_by_role("button", name="pace", exact=True))
     wait_until(gait_is(page, "pace"))
     page.reload(wait_until="commit")
     wait_for_status(page)
@@ -179,7 +179,7 @@ def box_of(page, label):
 
 def pause(page):
     """Until the page tells, to the step, where it stopped."""
-    page.get_by_role("button", name="pause", exact=True).click()
+    browsing.click(page.get_by_role("button", name="pause", exact=True))
     page.locator("p", has_text=re.compile(r"· \d+\.\d\d s ·")).wait_for()
 
 
@@ -187,12 +187,12 @@ def begin_recording(page):
     """And lets two seconds go, from when the page tells that it records."""
     from playwright.sync_api import TimeoutError as NotSeenError  # may not be installed
 
-    page.get_by_text("Recording", exact=True).click()
+    browsing.click(page.get_by_text("Recording", exact=True))
     record, save = (
         page.get_by_role("button", name=name, exact=True) for name in ("record", "end and save")
     )
     for _ in range(4):  # on a busy machine the browser may lose a click
-        record.click()
+        browsing.click(record)
         try:
             save.wait_for(timeout=60_000)
             break
@@ -205,7 +205,7 @@ def begin_recording(page):
 
 def end_recording(page, folder):
     """The log that was saved."""
-    page.get_by_role("button", name="end and save", exact=True).click()
+    browsing.click(page.get_by_role("button", name="end and save", exact=True))
     page.get_by_text("play the log with").first.wait_for()
     return Log.load(folder / "log-1.npz")
 
@@ -230,7 +230,7 @@ def test_alpha_on_the_page_decides_when_the_gait_shifts_and_a_push_is_felt(serve
     enter_alone(page, "α [mm]", 5)
     wait_until(gait_is(page, "bound"))
     browsing.wait_for_robot(page, "view", columns=BESIDE_THE_PANEL)
-    page.get_by_role("button", name="push", exact=True).click()
+    browsing.click(page.get_by_role("button", name="push", exact=True))
     clicked = status(page)[2]
     wait_until(lambda: abs(status(page)[2] - clicked) > 1.0)
     assert not wrong
@@ -245,19 +245,21 @@ def test_the_clock_and_the_ground_are_in_the_hands_of_whoever_looks(served, brow
     pause(page)
     stopped = status(page)[2]
     for step in range(1, 13):  # one after the other: a page may send two quick clicks as one
-        page.get_by_role("radio", name="one step").or_(page.get_by_text("one step")).first.click()
+        browsing.click(
+            page.get_by_role("radio", name="one step").or_(page.get_by_text("one step")).first
+        )
         expected = pytest.approx(stopped + 0.01 * step, abs=1e-6)
         wait_until(lambda expected=expected: status(page)[2] == expected)
-    page.get_by_text("restart", exact=True).first.click()
+    browsing.click(page.get_by_text("restart", exact=True).first)
     wait_until(lambda: status(page)[2] == 0.01)
-    page.get_by_role("button", name="go on", exact=True).click()
+    browsing.click(page.get_by_role("button", name="go on", exact=True))
     wait_until(lambda: status(page)[2] > 1.0)
-    page.get_by_text("Ground", exact=True).click()
+    browsing.click(page.get_by_text("Ground", exact=True))
     enter(page, "robots", 4)
     pause(page)
-    page.get_by_role("button", name="walk there", exact=True).click()
+    browsing.click(page.get_by_role("button", name="walk there", exact=True))
     wait_until(lambda: status(page)[2] == 0.01)
-    page.get_by_role("button", name="go on", exact=True).click()
+    browsing.click(page.get_by_role("button", name="go on", exact=True))
     wait_until(lambda: status(page)[2] > 1.0)
     browsing.wait_for_robot(page, "ghosts", columns=BESIDE_THE_PANEL)
     assert not wrong
@@ -270,7 +272,7 @@ def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_
     _, address = served("--track", "perlin:0.1@300")
     page, wrong = opened(browser, address)
     page.get_by_label("shifts by itself").uncheck()
-    page.get_by_role("button", name="trot", exact=True).click()
+    browsing.click(page.get_by_role("button", name="trot", exact=True))
     wait_until(gait_is(page, "trot"))
     enter_alone(page, "α [mm]", 5)  # with which it would shift at once
     page.get_by_label("the gait's own speed and stride").uncheck()
@@ -280,18 +282,18 @@ def test_speed_stride_ground_pace_and_push_reach_the_robot(served, browser, tmp_
     wait_until(lambda: status(page)[1] > walked + 3.0)
     assert status(page)[0] == "trot"
 
-    page.get_by_text("Ground", exact=True).click()
+    browsing.click(page.get_by_text("Ground", exact=True))
     box_of(page, "track").fill("perlin:0.02@150")
     box_of(page, "seed").fill("7")
     pause(page)
-    page.get_by_role("button", name="walk there", exact=True).click()
+    browsing.click(page.get_by_role("button", name="walk there", exact=True))
     wait_until(lambda: status(page)[2] == 0.01)
-    page.get_by_role("button", name="go on", exact=True).click()
+    browsing.click(page.get_by_role("button", name="go on", exact=True))
     begin_recording(page)
     enter(page, "force [N]", 200)
-    box_of(page, "direction").click()
-    page.get_by_role("option", name="right", exact=True).click()
-    page.get_by_role("button", name="push", exact=True).click()
+    browsing.click(box_of(page, "direction"))
+    browsing.click(page.get_by_role("option", name="right", exact=True))
+    browsing.click(page.get_by_role("button", name="push", exact=True))
     clicked = status(page)[2]
     wait_until(lambda: status(page)[2] > clicked + 1.0)
     log = end_recording(page, tmp_path / "recorded")
@@ -318,12 +320,11 @@ def test_buttons_and_keys_drive_the_robot(served, browser, tmp_path):
     _, address = served("--track", "flat@200")
     page, wrong = opened(browser, address)
     for name in ("faster", "left", "turn right", "higher"):
-        # Without waiting for two frames alike, which a busy machine may not draw for minutes.
-        page.get_by_role("button", name=name, exact=True).dispatch_event("click")
+        browsing.click(page.get_by_role("button", name=name, exact=True))
     wait_until(lambda: float(number_box(page, "height from stance [m]").input_value()) > -0.03)
     assert not page.get_by_label("the gait's own speed and stride").is_checked()
     assert float(number_box(page, "speed [m/s]").input_value()) == pytest.approx(1.3)
-    page.get_by_text("real time").first.click()  # no field of the page takes the keys
+    browsing.click(page.get_by_text("real time").first)  # no field of the page takes the keys
     for key in ("ArrowDown", "ArrowLeft", "ArrowLeft", "q"):
         page.keyboard.press(key)
     wait_until(lambda: float(number_box(page, "to the left [m/s]").input_value()) == 0.2)
@@ -335,7 +336,7 @@ def test_buttons_and_keys_drive_the_robot(served, browser, tmp_path):
     assert asked.body_height_command[0] == pytest.approx(-0.02, abs=1e-6)
     turned = np.unwrap(log.truth.yaw[:, 0])
     assert turned[-1] - turned[0] == pytest.approx(0.1 * np.ptp(log.time), abs=0.15)
-    page.get_by_text("real time").first.click()
+    browsing.click(page.get_by_text("real time").first)
     page.keyboard.press("Space")
     wait_until(lambda: float(number_box(page, "speed [m/s]").input_value()) == 0.0)
     assert not wrong
@@ -381,7 +382,7 @@ def test_two_tabs_see_the_same_robot_and_a_machine_that_slept_does_not_hurry(ser
     process, address = served("--track", "flat@200")
     one, wrong_in_one = opened(browser, address)
     other, wrong_in_other = opened(browser, address)
-    one.get_by_role("button", name="pace", exact=True).click()
+    browsing.click(one.get_by_role("button", name="pace", exact=True))
     wait_until(gait_is(other, "pace"))
     one.close()
     walked = status(other)[1]
@@ -406,12 +407,12 @@ def test_a_log_plays_in_the_browser_and_its_slider_is_obeyed(served, browser, tm
     _, address = served(str(tmp_path / "log.npz"))
     page, wrong = opened(browser, address, fine=True)
     wait_until(lambda: 0.5 < shown_time(page) < 5.0)
-    page.get_by_role("button", name="pause", exact=True).click()
+    browsing.click(page.get_by_role("button", name="pause", exact=True))
     page.get_by_role("button", name="play", exact=True).wait_for()
     settled(lambda: shown_time(page))
     enter(page, "time [s]", 4.5)
     assert settled(lambda: shown_time(page)) == pytest.approx(4.5, abs=0.02), "it stands still"
     browsing.wait_for_robot(page, "replay", columns=BESIDE_THE_PANEL)
-    page.get_by_role("button", name="play", exact=True).click()
+    browsing.click(page.get_by_role("button", name="play", exact=True))
     wait_until(lambda: abs(shown_time(page) - 4.5) > 0.3)
     assert not wrong
