@@ -10,7 +10,6 @@ sensors goes into policies/deployable; `tools/deployable_evidence.py` makes its 
 
 import argparse
 import json
-import shlex
 import shutil
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -53,18 +52,21 @@ def ship_deployable(run: Path) -> None:
     """Copies the policy of `run` and its record, which names no folder of this machine.
 
     Raises:
-        GaitshiftError: the run has another recipe than its preset has now.
+        GaitshiftError: no preset has the recipe of the run now.
     """
     folder = POLICIES / "deployable"
     loaded = policy.load(run / "policy.onnx")
-    words = shlex.split(loaded.info.training["command"])
-    preset = words[words.index("--preset") + 1]
-    recipe = RunConfig.read(run).recipe
-    threads = {"threads": recipe.threads, "physics_threads": recipe.physics_threads}
-    if recipe != replace(PRESETS[preset](), **threads):
-        raise GaitshiftError(f"{run} has another recipe than preset {preset}")
-    at = words.index("--out") if "--out" in words else len(words)
-    training = {**loaded.info.training, "command": shlex.join(words[:at] + words[at + 2 :])}
+    config = RunConfig.read(run)
+    threads = {
+        "threads": config.recipe.threads,
+        "physics_threads": config.recipe.physics_threads,
+    }
+    same = [name for name in PRESETS if config.recipe == replace(PRESETS[name](), **threads)]
+    if not same:
+        raise GaitshiftError(f"{run} has another recipe than the presets")
+    (preset,) = same
+    command = f"gaitshift train {loaded.gait} --preset {preset} --seed {config.seed} --threads 1"
+    training = {**loaded.info.training, "command": command}
     model = onnx.load(run / "policy.onnx")
     for entry in model.metadata_props:
         if entry.key == "gaitshift.training":

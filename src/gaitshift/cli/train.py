@@ -41,10 +41,14 @@ class Train(RobotOption):
 
     gait: Annotated[str | None, tyro.conf.Positional] = None
     """Name of a gait (see `gaitshift gaits`) or a machine file (.toml)."""
-    preset: Literal["default", "three-stage", "two-stage", "deployable", "paper"] | None = None
+    preset: (
+        Literal["default", "three-stage", "two-stage", "deployable", "deployable-gradual", "paper"]
+        | None
+    ) = None
     """Training recipe: default; three-stage or two-stage, by which the shipped policies are made;
-    deployable (sensors like ANYmal's, delay, robots that differ, mild ground); or paper (Table I,
-    30 robots, Kp 3, Kd 0.2, flat ground). If not given: default."""
+    deployable (sensors like ANYmal's, delay, robots that differ, mild ground); deployable-gradual
+    (the same with a smaller weight of the stance on flat ground); or paper (Table I, 30 robots, Kp
+    3, Kd 0.2, flat ground). If not given: default."""
     recipe: Path | None = None
     """TOML file of settings that differ from the preset, such as [ppo] and epochs = 3."""
     settings: Annotated[tuple[str, ...], tyro.conf.arg(name="set", metavar="NAME=VALUE")] = ()

@@ -110,6 +110,9 @@ class Stage:
     swing_factor: float = 1.0
     """Factor on the gait's swing heights; ours: feet that swing 14 cm high do not catch on steps;
     on level ground 10 cm is enough."""
+    stance_factor: float = 1.0
+    """Factor on the weight of the whole stance, `RewardConfig.stance_pattern`; ours: where it is
+    large from the start, a pace does not learn to walk slowly."""
     kl_factor: float = 1.0
     """Factor on PPO's `desired_kl`; ours: on rough ground larger updates learn more."""
     entropy_factor: float = 1.0
@@ -150,6 +153,7 @@ class Stage:
             push=(0.0, 1000.0),
             mixed_starts=(0.0, 1.0),
             swing_factor=(0.01, 100.0),
+            stance_factor=(0.01, 100.0),
             kl_factor=(0.001, 1000.0),
             entropy_factor=(0.0, 1000.0),
             horizon_factor=(0.001, 1000.0),
@@ -292,6 +296,7 @@ class Recipe:
         return Curriculum(
             strictness=self.strict_share * strictness,
             swing_factor=stage.swing_factor,
+            stance_factor=stage.stance_factor,
             command_scale=_grown(iteration, self.command_from, self.command_until),
             penalty_scale=first + (1.0 - first) * _grown(iteration, 0, self.penalty_until),
             randomisation=_grown(iteration, self.randomise_from, self.randomise_until),

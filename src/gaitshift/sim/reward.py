@@ -122,6 +122,7 @@ def walk_reward(
     in_time: Float[np.ndarray, " N"] | float = 1.0,
     chatter: Float[np.ndarray, " N"],
     action_change: Float[np.ndarray, "N 12"],
+    stance_factor: float = 1.0,
     penalty_scale: float = 1.0,
 ) -> RewardTerms:
     """R_walk, term by term (Table I and the additions).
@@ -139,6 +140,7 @@ def walk_reward(
         in_time: factor on the terms of the stance, below 1 where it is held for too long.
         chatter: number of feet that came down out of place, times the present strictness.
         action_change: action minus the action before it.
+        stance_factor: factor on the weight of the whole stance.
         penalty_scale: factor λ on the penalties, the terms of negative weight (paper III-D).
     """
     velocity = truth.velocity_b
@@ -166,7 +168,7 @@ def walk_reward(
         if height_error is None
         else config.height_tracking * np.exp(-np.square(height_error / HEIGHT_WIDTH)),
         "stance_feet": config.stance_feet * in_time * agreement,
-        "stance_pattern": config.stance_pattern * in_time * (agreement == 1.0),
+        "stance_pattern": stance_factor * config.stance_pattern * in_time * (agreement == 1.0),
         "slip": config.slip * (foot_speed_squared * sensed.contact).sum(axis=1),
         "power": config.power * sensed.power,
         "chatter": config.chatter * chatter,

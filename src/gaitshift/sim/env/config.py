@@ -104,7 +104,7 @@ class Curriculum:
     """What `GaitEnv` asks for at one time of a training; by default everything, as in a trial.
 
     Raises:
-        GaitshiftError: a share is not in 0 to 1, or the factor on swing heights is not above 0.
+        GaitshiftError: a share is not in 0 to 1, or a factor is not above 0.
     """
 
     strictness: float = 1.0
@@ -112,6 +112,8 @@ class Curriculum:
     on swing heights and punctuality, and factor on the price of chatter."""
     swing_factor: float = 1.0
     """Factor on the machine's swing heights."""
+    stance_factor: float = 1.0
+    """Factor on the weight of the whole stance, `RewardConfig.stance_pattern`."""
     command_scale: float = 1.0
     """The share of the gait's ranges that commands are drawn from, 0 to 1."""
     penalty_scale: float = 1.0
@@ -132,5 +134,6 @@ class Curriculum:
         ):
             if not 0 <= getattr(self, name) <= 1:
                 raise GaitshiftError(f"{name} must be 0 to 1, got {getattr(self, name)}")
-        if not self.swing_factor > 0:
-            raise GaitshiftError(f"swing_factor must be above 0, got {self.swing_factor}")
+        for name in ("swing_factor", "stance_factor"):
+            if not getattr(self, name) > 0:
+                raise GaitshiftError(f"{name} must be above 0, got {getattr(self, name)}")

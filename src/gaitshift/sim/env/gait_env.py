@@ -132,6 +132,7 @@ class GaitEnv(VectorEnv[Observations, np.ndarray, np.ndarray]):
             in_time=self._in_time(command),
             chatter=asked.strictness * chatter,
             action_change=action - before.last_action,
+            stance_factor=asked.stance_factor,
             penalty_scale=asked.penalty_scale,
         )
         is_real = self.machine.suiting(left, contact) == step.edge
