@@ -102,10 +102,9 @@ class Map(RobotOption, SensorOption):
             frequencies=self.frequencies,
         )
         if not wanted:
-            ranges = (f"{n} {p.machine.speed_range}" for n, p in loaded.items())
-            raise GaitshiftError(
-                f"speeds must be in the range of a gait, [m/s]: {', '.join(ranges)}"
-            )
+            ranges = ((name, *one.machine.speed_range) for name, one in loaded.items())
+            known = ", ".join(f"{name} {low:g} to {high:g} m/s" for name, low, high in ranges)
+            raise GaitshiftError(f"speeds must be in the range of a gait: {known}")
         same = {
             "sensors": self.sensors.name,
             "push": self.push,
