@@ -31,6 +31,7 @@ COMMANDS = {
     "transitions": "Test gait shifts of every ordered pair of gaits at random phases of the "
     "stride.",
     "map": "Measure survival, progress and cost of gaits at many speeds, on many grounds.",
+    "plan": "Identify a gait graph from a map: which gait at which speed, and where to shift.",
     "report": "Make one self-contained page of a log or of a training run.",
     "deploy": "Drive a robot that is reached by datagrams, at 100 Hz, and stop it softly.",
     "robot-sim": "Simulate a robot in real time that is reached by datagrams, for `deploy`.",
