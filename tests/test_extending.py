@@ -337,6 +337,7 @@ def test_a_robot_of_a_file_is_run_and_shown_by_the_commands(files, tmp_path, cap
         (["demo", "--controller", "cpg", "--out", "{out}"], "know ANYmal B alone"),
         (["view"], "'pony' has no policy for the gait 'trot'"),
         (["study", "--out", "{out}"], "'pony' has no policy for the gait 'trot'"),
+        (["map", "trot", "--out", "{out}"], "'pony' has no policy for the gait 'trot'"),
         (["transitions", "--out", "{out}"], "'pony' has no policy for the gait 'trot'"),
     ],
 )

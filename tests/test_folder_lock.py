@@ -132,6 +132,7 @@ TRAIN = ["--robots", "4", "--iterations", "3"]
         ["record", "trot", "--out", "{}"],
         ["transitions", "trot", "bound", "--out", "{}", "--overwrite"],
         ["study", "--out", "{}", "--overwrite"],
+        ["map", "trot", "--out", "{}", "--overwrite"],
         ["reproduce", "--quick", "--out", "{}", "--runs", "{}/runs"],
         ["reproduce", "--quick", "--runs", "{}", "--out", "{}/out"],
         ["bench", "time-to-gait", "--out", "{}", "--overwrite"],

@@ -136,12 +136,13 @@ def test_commands_spread_in_a_straight_line_and_go_by_no_other_schedule():
     assert {i: recipe.curriculum(i).command_scale for i in table} == table
 
 
-def test_each_stage_asks_for_its_own_swings_and_mixed_starts():
+def test_each_stage_asks_for_its_own_swings_stances_and_mixed_starts():
     low, high = Stage(name="low", iterations=3), Stage(name="high", iterations=2)
-    high = replace(high, swing_factor=1.4, mixed_starts=0.25)
+    high = replace(high, swing_factor=1.4, stance_factor=0.7, mixed_starts=0.25)
     recipe = replace(TINY, stages=(low, high))
     asked = [recipe.curriculum(i) for i in range(7)]
     assert [now.swing_factor for now in asked] == [1.0] * 3 + [1.4] * 4
+    assert [now.stance_factor for now in asked] == [1.0] * 3 + [0.7] * 4
     assert [now.mixed_starts for now in asked] == [0.0] * 3 + [0.25] * 4
 
 

@@ -124,6 +124,23 @@ def test_a_swing_factor_is_higher_swings_asked_for():
     assert partly > 5
 
 
+def test_a_stance_factor_weighs_whole_stances_as_another_weight_does():
+    weight = RewardConfig().stance_pattern
+    config = EnvConfig(reward=RewardConfig(stance_pattern=2.5 * weight))
+    envs = [
+        GaitEnv(gaits.load("trot"), FLAT, 4, config=c, threads=1) for c in (EnvConfig(), config)
+    ]
+    envs[0].curriculum = Curriculum(stance_factor=2.5)
+    for env in envs:
+        env.reset(seed=0)
+    shown = 0
+    for action in arbitrary_actions(2, 100, 4, size=0.2):
+        (_, by_factor, *_), (_, by_weight, *_, info) = (env.step(action) for env in envs)
+        np.testing.assert_allclose(by_factor, by_weight, atol=1e-9)
+        shown += np.count_nonzero(info["reward_terms"]["stance_pattern"])
+    assert shown > 5
+
+
 @pytest.mark.parametrize("strictness", [0.0, 0.25, 1.0])
 def test_a_late_change_earns_less_of_the_bonus(strictness):
     """Against an env that does not ask: full until 2 steps late, nothing half a dwell after it."""
