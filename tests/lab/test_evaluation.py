@@ -163,6 +163,23 @@ def test_a_speed_or_frequency_that_is_given_holds_for_every_gait(standing) -> No
     np.testing.assert_allclose(frequency[:10, :, 0], 0.9)
 
 
+def test_speeds_are_asked_for_in_turn_and_the_last_one_stays(standing) -> None:
+    command = _commanded(standing, speeds=((0.3, 0.05), (0.9, 0.1), (0.5, 0.02)))
+    asked = command[:, 0, 0]
+    np.testing.assert_allclose(asked[:5], 0.3)
+    np.testing.assert_allclose(asked[5:15], 0.9)
+    np.testing.assert_allclose(asked[15:], 0.5)
+    assert len(asked) > 17
+
+
+def test_a_demo_with_speeds_shifts_half_a_second_after_a_command() -> None:
+    config = DemoConfig(graph="speed", speeds=((0.4, 2.0), (1.0, 2.0), (0.4, 1.5)))
+    log, (summary,) = run_demo(config)
+    assert log.time[-1] == pytest.approx(5.5)
+    shifts = [(shift["to"], shift["time_s"]) for shift in summary["switches"]]
+    assert shifts == [("trot", 2.51), ("walk", 4.51)]
+
+
 def test_an_evaluation_asks_for_what_its_config_says(standing) -> None:
     config = EvaluationConfig(episodes=2, seconds=0.1, speed=0.5, stride_frequency=3.0)
     command = commands_of(evaluate(standing["quick"], config)[1])
@@ -262,6 +279,16 @@ def test_a_schedule_is_kept_to_the_step() -> None:
         (
             lambda: DemoConfig(gaits=("trot", "pace", "trot"), at=(2.0, 1.0)),
             "at must give rising times",
+        ),
+        (
+            lambda: DemoConfig(speeds=((0.5, 2.0), (4.0, 2.0))),
+            "speeds must be 0 to 3 m/s for 0.2 to 3600 s each, got 4@2",
+        ),
+        (lambda: DemoConfig(speeds=((0.5, 0.0),)), "for 0.2 to 3600 s each, got 0.5@0"),
+        (lambda: DemoConfig(speeds=((float("nan"), 2.0),)), "each, got nan@2"),
+        (
+            lambda: DemoConfig(speeds=((0.5, 2.0),), gaits=("trot", "pace")),
+            "speeds and gaits must not both be given",
         ),
         (lambda: DemoConfig(every=0.0), "every must be 0.2 to 60 s, got 0.0"),
     ],

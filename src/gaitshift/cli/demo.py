@@ -50,6 +50,25 @@ _numbers = tyro.constructors.PrimitiveConstructorSpec[tuple[float, ...]](
 )
 
 
+def _split_speeds(text: str) -> tuple[tuple[float, float], ...]:
+    try:
+        pairs = [part.split("@") for part in _split(text)]
+        return tuple((float(speed), float(seconds)) for speed, seconds in pairs)
+    except ValueError:
+        raise GaitshiftError(
+            f"speeds must be SPEED@SECONDS separated by commas, such as 0.3@8,1.5@4, got '{text}'"
+        ) from None
+
+
+_speeds = tyro.constructors.PrimitiveConstructorSpec[tuple[tuple[float, float], ...]](
+    nargs=1,
+    metavar="M/S@S,…",
+    instance_from_str=lambda args: _split_speeds(args[0]),
+    is_instance=lambda instance: isinstance(instance, tuple),
+    str_from_instance=lambda instance: [",".join(f"{v:g}@{t:g}" for v, t in instance)],
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Demo(RobotOptions, SensorOption, DemoConfig):
     """Simulate a robot that crosses flat and rough ground and shifts its gait by itself."""
@@ -60,6 +79,9 @@ class Demo(RobotOptions, SensorOption, DemoConfig):
     at: Annotated[tuple[float, ...], _numbers] = ()
     """Times of the shifts between these gaits [s], such as 2,5,8; by default every `every`
     seconds."""
+    speeds: Annotated[tuple[tuple[float, float], ...], _speeds] = ()
+    """Forward speeds that are commanded in turn on flat ground, each with its time, such as
+    0.3@8,1.5@4 for 8 s at 0.3 m/s and 4 s at 1.5 m/s; in place of the track."""
     out: Path = Path("gaitshift-demo")
     """Folder for index.html, demo.mp4, demo.png, log.npz and summary.json."""
     overwrite: bool = False

@@ -20,7 +20,7 @@ class Plan:
     """Identify a gait graph from a map: which gait at which speed, and where to shift.
 
     Thresholds lie where the gaits' figures cross, with hysteresis. A gait that is nowhere clearly
-    the best is left out. Writes a graph file for `demo`, `view` and `deploy`.
+    the best is left out. Writes a graph file for `demo --speeds`, `view` and `deploy`.
     """
 
     map: Annotated[Path, tyro.conf.Positional]

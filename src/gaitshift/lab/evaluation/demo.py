@@ -12,6 +12,7 @@ from gaitshift.control.controller import ControllerMaker, controller_maker
 from gaitshift.errors import GaitshiftError
 from gaitshift.lab.evaluation.rollout import RolloutConfig, rollout
 from gaitshift.lab.log import Log
+from gaitshift.robot.command import MOST_SPEED
 from gaitshift.shift import GaitGraph, between, load_graph, tuned
 from gaitshift.shift.graph_file import DEFAULT
 from gaitshift.sim.sensor_config import PERFECT, SensorConfig
@@ -71,6 +72,9 @@ class DemoConfig(SimulatorChoice):
     """Time between two shifts of `gaits` [s]."""
     at: tuple[float, ...] = ()
     """Times of the shifts between `gaits` [s], in place of `every`."""
+    speeds: tuple[tuple[float, float], ...] = ()
+    """Forward speeds [m/s] that are commanded in turn on flat ground, each with its time [s], in
+    place of the track."""
     sensors: SensorConfig = PERFECT
     """Sensors of the robots and their link to the joints."""
     episodes: int = 1
@@ -93,6 +97,14 @@ class DemoConfig(SimulatorChoice):
                 f"at must give {max(0, len(self.gaits) - 1)} times for {len(self.gaits)} gaits, "
                 f"one for each shift, got {len(self.at)}"
             )
+        if self.speeds and self.gaits:
+            raise GaitshiftError("speeds and gaits must not both be given")
+        for speed, seconds in self.speeds:
+            if not (0 <= speed <= MOST_SPEED and 0.2 <= seconds <= LATEST):
+                raise GaitshiftError(
+                    f"speeds must be 0 to {MOST_SPEED:g} m/s for 0.2 to {LATEST:g} s each, got "
+                    f"{speed:g}@{seconds:g}"
+                )
         rise = all(early < late <= LATEST for early, late in pairwise((0.0, *self.at)))
         if not rise:  # NaN is neither above nor below a time
             raise GaitshiftError(
@@ -140,7 +152,7 @@ def run_demo(
     grounds = [_ground(config, config.seed + i) for i in range(n)]
     finish = _finish(config, grounds[0])
     slowest = float(controller.repertoire.forward_speed.min())
-    run = RolloutConfig(seconds=_seconds(config, finish, slowest))
+    run = RolloutConfig(seconds=_seconds(config, finish, slowest), speeds=config.speeds)
     make_world = simulator_maker(config.simulator)
     world = make_world(
         controller.robot,
@@ -201,17 +213,19 @@ def _switcher(config: DemoConfig) -> Switcher:
 
 
 def _ground(config: DemoConfig, seed: int) -> Terrain:
-    if config.gaits:
+    if config.gaits or config.speeds:
         return from_spec("flat", seed=seed, length=10.0, width=WIDTH)
     return from_spec(f"{config.track},flat@{RUN_OUT}", seed=seed, length=1.0, width=WIDTH)
 
 
 def _finish(config: DemoConfig, ground: Terrain) -> float:
-    return np.inf if config.gaits else ground.extent[1] - RUN_OUT
+    return np.inf if config.gaits or config.speeds else ground.extent[1] - RUN_OUT
 
 
 def _seconds(config: DemoConfig, finish: float, speed: float) -> float:
-    """Time that a robot needs at two thirds of the commanded speed `speed` [m/s]."""
+    """Length of the run; on a track the time at two thirds of the commanded speed [m/s]."""
+    if config.speeds:
+        return sum(seconds for _, seconds in config.speeds)
     if config.gaits:
         return config.shift_times[-1] + config.every
     return 1.5 * (finish - START) / speed

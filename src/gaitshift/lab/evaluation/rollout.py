@@ -23,6 +23,9 @@ class RolloutConfig:
     """Length of the run [s]."""
     speed: float | None = None
     """Commanded forward speed [m/s]; None: that of each robot's gait."""
+    speeds: tuple[tuple[float, float], ...] = ()
+    """Commanded forward speeds [m/s] in turn, each with its time [s], in place of `speed`; the last
+    one stays."""
     stride_frequency: float | None = None
     """Commanded stride frequency [Hz]; None: that of each robot's gait."""
     lateral_speed: float = 0.0
@@ -41,6 +44,14 @@ class RolloutConfig:
     """Joints start within ± this of the stance [rad]."""
     values: bool = False
     """Whether the log keeps what the policies' critics expect."""
+
+    def speed_at(self, time: float) -> float | None:
+        """The commanded forward speed at a time since the start [s]."""
+        for speed, seconds in self.speeds[:-1]:
+            if time < seconds - 1e-9:
+                return speed
+            time -= seconds
+        return self.speeds[-1][0] if self.speeds else self.speed
 
     @property
     def steps(self) -> int:
@@ -73,6 +84,8 @@ class Walk:
         self.world, self.controller, self.switcher = world, controller, switcher
         self.config = config
         """May be replaced between two steps, to command another speed."""
+        self.steps = 0
+        """Control steps so far."""
         n = world.n
         noise = rng.uniform(-config.joint_noise, config.joint_noise, (n, 12))
         self._stance = controller.robot.stance_angles
@@ -81,8 +94,6 @@ class Walk:
         self._start_y = start_xy[:, 1]
         self.fallen: Bool[np.ndarray, " N"] = np.zeros(n, dtype=bool)
         """Which robots have fallen so far."""
-        self.steps = 0
-        """Control steps so far."""
         self.decision: Decision | None = None
         """The switcher's decision in the last step."""
         self._heading: Float[np.ndarray, " N"] = np.zeros(n)
@@ -142,7 +153,7 @@ class Walk:
             return otherwise if value is None else np.full(n, value)
 
         return Command(
-            forward_speed=given(config.speed, own.forward_speed),
+            forward_speed=given(config.speed_at(self.time), own.forward_speed),
             yaw_rate=self._turn(),
             stride_frequency=given(config.stride_frequency, own.stride_frequency),
             lateral_speed=np.full(n, config.lateral_speed),
