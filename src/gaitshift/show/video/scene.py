@@ -118,12 +118,13 @@ def _set_look(spec: mujoco.MjSpec, width: int, height: int) -> None:
 
 def _around(terrain: Terrain, course: Float[np.ndarray, "T 2"]) -> Terrain:
     """The part of a terrain in sight of the course; level ground extends beyond its border."""
-    (left, back), (right, front) = course.min(axis=0) - _REACH, course.max(axis=0) + _REACH
+    left, back = (float(end) for end in course.min(axis=0) - _REACH)
+    right, front = (float(end) for end in course.max(axis=0) + _REACH)
     if terrain.is_flat:
         return Terrain(
             height=np.full(_fog_grid(right - left, front - back), terrain.height[0, 0]),
-            size=(float(right - left), float(front - back)),
-            origin=(float(left), float(back)),
+            size=(right - left, front - back),
+            origin=(left, back),
             name=terrain.name,
         )
     (dx, dy), (x0, y0) = terrain.cell, terrain.origin
