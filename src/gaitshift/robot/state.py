@@ -152,7 +152,7 @@ class Proprioception(Moving):
     """
 
     _commands = tuple(f"{name}_command" for name in COMMAND_PARTS)
-    apart = frozenset(("has_heading", "time", "period", "mass", "value", *_commands))
+    apart = frozenset(("time", "period", "mass", "value", *_commands))
 
     contact: Bool[np.ndarray, "*batch 4"]
     """Whether each foot is in contact with the ground."""
@@ -225,6 +225,24 @@ class Proprioception(Moving):
         x, y, z = (self.foot_position_b[..., axis] for axis in range(3))
         gx, gy, gz = (self.gravity_b[..., axis, None] for axis in range(3))
         return -(x * gx + y * gy + z * gz)
+
+    @cached_property
+    def foot_position_upright(self) -> Float[np.ndarray, "*batch 4 3"]:
+        """Feet from the base with z along the vertical, and x, y turned by the yaw [m].
+
+        Where there is no heading, x is the body's heading.
+        """
+        px, py, pz = (self.foot_position_b[..., axis] for axis in range(3))
+        ux, uy, uz = (-self.gravity_b[..., axis, None] for axis in range(3))
+        level = np.sqrt(np.maximum(1.0 - ux * ux, 1e-12))  # of the body's x axis in the horizontal
+        # Rows of the rotation: the heading, the horizontal to its left, and up.
+        x = level * px - ux * (uy * py + uz * pz) / level
+        y = (uz * py - uy * pz) / level
+        z = ux * px + uy * py + uz * pz
+        if self.has_heading:
+            c, s = np.cos(self.yaw)[..., None], np.sin(self.yaw)[..., None]
+            x, y = c * x - s * y, s * x + c * y
+        return np.stack([x, y, z], axis=-1)
 
     @cached_property
     def base_height(self) -> Float[np.ndarray, "*batch"]:

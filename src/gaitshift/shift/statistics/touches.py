@@ -67,7 +67,7 @@ class LegOdometry:
         self, state: OdometryState, sensed: Proprioception
     ) -> tuple[OdometryState, Float[np.ndarray, "N 4 3"]]:
         """The base after this step, and where each foot is in the same frame [m]."""
-        foot = upright(sensed)
+        foot = sensed.foot_position_upright
         stands = self._standing(state, sensed, foot)
         count = stands.sum(axis=1)[:, None]
         back = np.where(stands[..., None], state.foot - foot, 0.0).sum(axis=1)
@@ -118,25 +118,6 @@ def _square(vector: Float[np.ndarray, "*batch 3"]) -> Float[np.ndarray, "*batch"
     # Written out, so that one robot gives the same bits alone and in a batch.
     x, y, z = (vector[..., axis] for axis in range(3))
     return x * x + y * y + z * z
-
-
-def upright(sensed: Proprioception) -> Float[np.ndarray, "N 4 3"]:
-    """Feet from the base with z along the vertical, and x, y turned by the yaw [m].
-
-    Where there is no heading, x is the body's heading.
-    """
-    up = -sensed.gravity_b
-    ux, uy, uz = (up[:, None, axis] for axis in range(3))
-    px, py, pz = (sensed.foot_position_b[..., axis] for axis in range(3))
-    level = np.sqrt(np.maximum(1.0 - ux * ux, 1e-12))  # of the body's x axis in the horizontal
-    # Rows of the rotation: the heading, the horizontal to its left, and up.
-    x = level * px - ux * (uy * py + uz * pz) / level
-    y = (uz * py - uy * pz) / level
-    z = ux * px + uy * py + uz * pz
-    if not sensed.has_heading:
-        return np.stack([x, y, z], axis=2)
-    c, s = np.cos(sensed.yaw)[:, None], np.sin(sensed.yaw)[:, None]
-    return np.stack([c * x - s * y, s * x + c * y, z], axis=2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
