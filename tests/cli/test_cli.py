@@ -66,8 +66,8 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
         (["demo", "--flat-gait", "canter"], "got 'canter'"),
         (["demo", "--track", "flat@2,perlin@2"], "perlin@2"),
         (
-            ["demo", "--speeds", "0.3,1.2@4"],
-            "speeds must be SPEED@SECONDS separated by commas, such as 0.3@8,1.5@4, got '0.3,1.2@4'",
+            ["demo", "--speeds", "0.3,1@4"],
+            "speeds must be SPEED@SECONDS separated by commas, such as 0.3@8,1.5@4, got '0.3,1@4'",
         ),
         (
             ["demo", "--gaits", "trot,bound", "--at", "1,x"],
