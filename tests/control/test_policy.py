@@ -294,6 +294,7 @@ def test_an_unknown_name_is_refused_with_those_there_are():
     assert line.startswith("policy must be one of ")
     assert "got 'canter'" in line
     assert all(name in line for name in policy.shipped())
+    assert all(f"deployable/{name}" in line for name in policy.shipped("deployable"))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.001, 0.2, 0.5, 0.9, 0.99, 0.9999])

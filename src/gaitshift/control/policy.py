@@ -134,9 +134,10 @@ def load(name_or_path: str | Path, robot: Robot = ANYMAL_B) -> Policy:
     if path.suffix != ".onnx":
         path = _SHIPPED / f"{name_or_path}.onnx"
         if not path.is_file():
+            sensed = ", ".join(f"deployable/{gait}" for gait in shipped("deployable"))
             raise GaitshiftError(
-                f"policy must be one of {', '.join(shipped())} or a .onnx file, got "
-                f"'{name_or_path}'"
+                f"policy must be one of {', '.join(shipped())}; or, for real sensors, one of "
+                f"{sensed}; or a .onnx file, got '{name_or_path}'"
             )
         if robot != ANYMAL_B:
             raise GaitshiftError(
