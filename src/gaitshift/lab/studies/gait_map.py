@@ -249,12 +249,14 @@ def ratio(
 
 PICTURE = "map.png"
 
-_INTRODUCTION = """Robots walk straight ahead, at each speed that a gait's range has and at each of
-its stride frequencies that the command asks for; fields and starts are the same for all gaits. A
-gait can be the best where at least {survival:g} of its robots survive{speed}; of its stride
-frequencies the best counts. Figures leave out the first {warm_up:g} s, and robots after their
-fall. CoT is Σ|τ q̇| over weight and distance, of all robots together, with half the width of its
-interval (95 %)."""
+_INTRODUCTION = (
+    "Robots walk straight ahead at each speed that a gait's range has; of several stride "
+    "frequencies the best counts. A gait can be the best where at least {survival:g} of its robots "
+    "survive{speed}; else the reason is in brackets. Fields and starts are the same for all gaits. "
+    "Figures leave out the first {warm_up:g} s, and robots after their fall. Costs of transport are "
+    "energy over weight and distance, of all robots together; ± is half the width of an interval "
+    "(95 %)."
+)
 
 
 def places(
@@ -292,7 +294,7 @@ def page(rows: Sequence[Row], objective: Objective, command: str) -> str:
     speed = (
         ""
         if objective.name == "progress"
-        else f" and keep the speed within {SPEED_ERROR:.0%} or {LEAST_SPEED_ERROR:g} m/s"
+        else f" and keep the speed within {100 * SPEED_ERROR:g} % or {LEAST_SPEED_ERROR:g} m/s"
     )
     words = _INTRODUCTION.format(survival=objective.survival, speed=speed, warm_up=WARM_UP)
     parts = [
