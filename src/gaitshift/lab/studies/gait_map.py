@@ -253,7 +253,7 @@ _INTRODUCTION = (
     "Robots walk straight ahead at each speed that a gait's range has; of several stride "
     "frequencies the best counts. A gait can be the best where at least {survival:g} of its robots "
     "survive{speed}; else the reason is in brackets. Fields and starts are the same for all gaits. "
-    "Figures leave out the first {warm_up:g} s, and robots after their fall. Costs of transport are "
+    "Figures leave out the first {warm_up:g} s, and robots after their fall. Cost of transport is "
     "energy over weight and distance, of all robots together; ± is half the width of an interval "
     "(95 %)."
 )

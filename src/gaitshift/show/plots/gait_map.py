@@ -74,9 +74,12 @@ def map_figure(
         for axes, (ground, of) in zip(grid.ravel(), of_ground, strict=False):
             _panel(axes, ground, of, objective, colours)
         handles = [Line2D([], [], color=colours[name], marker="o", markersize=6) for name in names]
-        labels = [name.replace("_", "-") for name in names]
-        figure.tight_layout(rect=(0.0, 0.1 / down, 1.0, 1.0))
-        figure.legend(handles, labels, loc="lower center", ncols=min(len(names), 5), fontsize=12)
+        labels = _labels(names)
+        columns = max(1, int(figure.get_figwidth() / (0.6 + 0.09 * max(map(len, labels)))))
+        lines = -(-len(labels) // columns)
+        height = (0.15 + 0.25 * lines) / figure.get_figheight()
+        figure.tight_layout(rect=(0.0, height, 1.0, 1.0))
+        figure.legend(handles, labels, loc="lower center", ncols=columns, fontsize=12)
         save(figure, path)
     return figure
 
@@ -87,6 +90,13 @@ def _colours(gaits: Mapping[str, str]) -> dict[str, str]:
     for name, gait in gaits.items():
         first[name] = name if gait in first.values() else gait
     return dict(zip(first, gait_colours(first.values()).values(), strict=True))
+
+
+def _labels(names: Sequence[str]) -> list[str]:
+    """The names without a folder that all of them have."""
+    folders = {name.rpartition("/")[0] for name in names}
+    short = [name.rpartition("/")[2] for name in names] if len(folders) == 1 else names
+    return [name.replace("_", "-") for name in short]
 
 
 def _panel(
