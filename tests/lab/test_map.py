@@ -245,6 +245,23 @@ def test_a_row_has_every_column_and_its_key():
     assert (made["survived"], made["robots"], made["speed_m_s"]) == (4, 4, 1.0)
 
 
+def test_a_payload_is_a_part_of_the_weight_that_is_carried():
+    walks = Walks(**dict.fromkeys(Walks.__annotations__, np.ones(4)) | {"fell": np.zeros(4, bool)})
+    same = {"sensors": "perfect", "push": 0.0, "seed": 0, "seconds": 5.0}
+    light, heavy = (
+        row_of(
+            "trot",
+            TROT,
+            Place(ground="flat", body=b, speed=1.0, stride_frequency=2.5),
+            walks,
+            **same,
+        )
+        for b in ("own", "payload:10")
+    )
+    assert light["cost_of_transport"] == pytest.approx(1.0 / (MASS * GRAVITY), abs=1e-5)
+    assert heavy["cost_of_transport"] == pytest.approx(1.0 / ((MASS + 10.0) * GRAVITY), abs=1e-5)
+
+
 # The command -------------------------------------------------------------------------------------
 
 

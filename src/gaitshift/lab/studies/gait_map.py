@@ -200,7 +200,7 @@ def row_of(name: str, policy: Policy, place: Place, walks: Walks, **same: float 
     """The row of the policy called `name`; `same` has the columns that are equal in all rows."""
     n, upright = len(walks.fell), int((~walks.fell).sum())
     low, high = wilson(np.array([float(upright)]), np.array([float(n)]))
-    weight = policy.robot.mass * GRAVITY
+    weight = (policy.robot.mass + body_of(place.body).payload[0]) * GRAVITY
     row: Row = {
         "policy": name,
         "gait": policy.gait,
